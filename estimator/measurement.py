@@ -1,0 +1,121 @@
+"""The data model: what a radio measures, and the conventions that every module relies on.
+
+Time convention exp(+jωt): a delay τ appears as exp(−j2πfτ). World frame, right-handed,
+metres: x cross-range (along a linear array), y range (boresight), z up. Samples are
+S-parameters between antenna ports: a free-space link has |S21| = λ/(4πR). Angles of
+arrival are measured from the array's axis (+x), broadside is 90°.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+Waves = Literal["spherical", "cylindrical"]
+
+UNIFORM_STEP = 1e-6
+"""Largest departure from a uniform frequency grid, over the step: 1e-6 of 75 MHz at 2 m of
+range is 1e-6 rad, far below any noise. [-]"""
+
+
+class MeasurementError(ValueError):
+    """A measurement cannot be used; the message names the variable, the value and the remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Echo:
+    """Monostatic stepped-frequency echo of the scene."""
+
+    samples: Complex[np.ndarray, "positions freqs"]  # S-parameter [-]
+    positions: Float[np.ndarray, "positions 3"]  # phase centres [m]
+    frequencies: Float[np.ndarray, " freqs"]  # [Hz]
+
+    def __post_init__(self) -> None:
+        """Refuse samples, positions or frequencies that no method could use."""
+        _check("echo", self.samples, self.positions, self.frequencies)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uplink:
+    """One user's pilot, as each element of the array receives it."""
+
+    samples: Complex[np.ndarray, "elements freqs"]  # S-parameter [-]
+    positions: Float[np.ndarray, "elements 3"]  # phase centres [m]
+    frequencies: Float[np.ndarray, " freqs"]  # [Hz]
+    user: str
+
+    def __post_init__(self) -> None:
+        """Refuse samples, positions or frequencies that no method could use."""
+        _check(f"uplink of {self.user!r}", self.samples, self.positions, self.frequencies)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """Everything that the estimator may know: no scene, no truth."""
+
+    echo: Echo | None
+    uplinks: tuple[Uplink, ...]
+    waves: Waves = "spherical"
+    boresight: Float[np.ndarray, " 3"] = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+    clock_offset: float | None = None  # user's clock minus ours; None: unknown [s]
+    scenario: str | None = None
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a measurement without data."""
+        if self.echo is None and not self.uplinks:
+            raise MeasurementError("the measurement has neither 'echo' nor 'uplink': give one")
+
+
+def frequency_step(frequencies: Float[np.ndarray, " freqs"]) -> float:
+    """Return the step of a uniform frequency grid. [Hz]
+
+    Raises
+    ------
+    MeasurementError
+        If there is one frequency only, or the steps differ by more than
+        :data:`UNIFORM_STEP`.
+    """
+    if frequencies.size < 2:
+        raise MeasurementError(
+            "frequency: one point has no bandwidth; range needs at least two frequencies"
+        )
+    step = float(frequencies[-1] - frequencies[0]) / (frequencies.size - 1)
+    grid = frequencies[0] + step * np.arange(frequencies.size)
+    worst = int(np.argmax(np.abs(frequencies - grid)))
+    if abs(frequencies[worst] - grid[worst]) > UNIFORM_STEP * abs(step):
+        raise MeasurementError(
+            f"frequency: the grid is not uniform (point {worst} is {frequencies[worst]:.6g} Hz, "
+            f"a uniform one has {grid[worst]:.6g} Hz); resample the sweep to equal steps"
+        )
+    return step
+
+
+def _check(
+    name: str,
+    samples: Complex[np.ndarray, "positions freqs"],
+    positions: Float[np.ndarray, "positions 3"],
+    frequencies: Float[np.ndarray, " freqs"],
+) -> None:
+    expected = (len(positions), len(frequencies))
+    if samples.shape != expected:
+        raise MeasurementError(
+            f"{name}: samples have shape {samples.shape}, but there are {expected[0]} positions "
+            f"and {expected[1]} frequencies; the shape must be {expected}"
+        )
+    if 0 in expected:
+        raise MeasurementError(f"{name}: empty (shape {expected}); measure at least one sample")
+    for what, values in (("samples", samples), ("positions", positions), ("frequencies", frequencies)):
+        bad = np.count_nonzero(~np.isfinite(values))
+        if bad:
+            raise MeasurementError(
+                f"{name}: {bad} of {values.size} {what} are NaN or infinite; "
+                "a chunk may be missing: measure again or remove those rows"
+            )
+    if frequencies[0] <= 0 or np.any(np.diff(frequencies) <= 0):
+        raise MeasurementError(f"{name}: frequencies must be positive and increasing; sort them")
+    if len(np.unique(positions, axis=0)) < len(positions):
+        raise MeasurementError(f"{name}: two positions coincide; keep one of each")
+    if not np.any(samples):
+        raise MeasurementError(f"{name}: all samples are zero; nothing was received")
