@@ -25,15 +25,16 @@ class MeasurementError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Echo:
-    """Monostatic stepped-frequency echo of the scene."""
+    """Stepped-frequency echo of the scene: monostatic, or from transmitters that stand apart."""
 
     samples: Complex[np.ndarray, "positions freqs"]  # S-parameter [-]
-    positions: Float[np.ndarray, "positions 3"]  # phase centres [m]
+    positions: Float[np.ndarray, "positions 3"]  # phase centres, of the receiver [m]
     frequencies: Float[np.ndarray, " freqs"]  # [Hz]
+    transmit_positions: Float[np.ndarray, "positions 3"] | None = None  # None: monostatic [m]
 
     def __post_init__(self) -> None:
         """Refuse samples, positions or frequencies that no method could use."""
-        _check("echo", self.samples, self.positions, self.frequencies)
+        _check("echo", self.samples, self.positions, self.frequencies, self.transmit_positions)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +98,7 @@ def _check(
     samples: Complex[np.ndarray, "positions freqs"],
     positions: Float[np.ndarray, "positions 3"],
     frequencies: Float[np.ndarray, " freqs"],
+    transmit_positions: Float[np.ndarray, "positions 3"] | None = None,
 ) -> None:
     expected = (len(positions), len(frequencies))
     if samples.shape != expected:
@@ -106,7 +108,16 @@ def _check(
         )
     if 0 in expected:
         raise MeasurementError(f"{name}: empty (shape {expected}); measure at least one sample")
-    for what, values in (("samples", samples), ("positions", positions), ("frequencies", frequencies)):
+    channels = positions
+    if transmit_positions is not None:
+        if transmit_positions.shape != positions.shape:
+            raise MeasurementError(
+                f"{name}: {len(transmit_positions)} transmit positions for {expected[0]} receive "
+                "positions; give one pair for each row of samples"
+            )
+        channels = np.concatenate([positions, transmit_positions], axis=1)
+    arrays = {"samples": samples, "positions": channels, "frequencies": frequencies}
+    for what, values in arrays.items():
         bad = np.count_nonzero(~np.isfinite(values))
         if bad:
             raise MeasurementError(
@@ -115,7 +126,7 @@ def _check(
             )
     if frequencies[0] <= 0 or np.any(np.diff(frequencies) <= 0):
         raise MeasurementError(f"{name}: frequencies must be positive and increasing; sort them")
-    if len(np.unique(positions, axis=0)) < len(positions):
+    if len(np.unique(channels, axis=0)) < len(channels):
         raise MeasurementError(f"{name}: two positions coincide; keep one of each")
     if not np.any(samples):
         raise MeasurementError(f"{name}: all samples are zero; nothing was received")

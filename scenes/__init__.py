@@ -1,1 +1,6 @@
-"""."""
+"""The truth: scenarios, their shapes with frozen roughness, and the library of them.
+
+World frame, right-handed, metres: x cross-range (along a linear array), y range
+(boresight), z up. Files and the command line use degrees, GHz and mm, with the unit in the
+key's name; everything that leaves this package is SI and radians.
+"""

@@ -1,0 +1,249 @@
+"""The estimator, whole: image, mirrors, angle/range map, paths, position."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.angle_range_map import angle_range_map, default_angles, default_path_lengths
+from estimator.array_frame import ArrayFrame, array_frame
+from estimator.backprojection import focus, prepare
+from estimator.estimate import Estimate, Image, Mirror, Progress, UserEstimate
+from estimator.ghost_correction import corrected_image
+from estimator.measurement import Echo, Measurement, Uplink, frequency_step
+from estimator.mirror_fit import FittedLine
+from estimator.mirrors import detect_mirrors, echo_reach, echo_resolution, unaliased_sine
+from estimator.paths import find_paths
+from estimator.pixel_grid import PixelGrid
+from estimator.projection import Wall, crossing, mirrored
+from estimator.range_profiles import range_profiles
+from estimator.user_decision import decide
+
+PIXELS = 1_500_000
+"""Most pixels of an image that is shown; its spacing grows beyond."""
+
+MAP_SAMPLES = 1.5
+"""Samples of the angle/range map for each -3 dB width: a peak between them loses 1.3 dB at
+most, and is refined off the grid. [-]"""
+
+
+def locate(measurement: Measurement, *, progress: Progress | None = None) -> Estimate:
+    """Find mirrors and users from a measurement alone.
+
+    Parameters
+    ----------
+    measurement
+        Echo and uplinks of a linear array; either may be missing.
+    progress
+        Told each stage.
+
+    Returns
+    -------
+    Mirrors, users and the images, all in the world frame.
+
+    Raises
+    ------
+    MeasurementError
+        If the array is not linear or the frequency grid not uniform.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    timings: dict[str, float] = {}
+    notes = []
+    if measurement.clock_offset is None:
+        notes.append("the clock offset of the user is unknown and was taken to be 0")
+    echo, uplinks = measurement.echo, _on_our_clock(measurement)
+    for part in (*([echo] if echo else []), *uplinks):
+        frequency_step(part.frequencies)  # refused before any work
+    positions = echo.positions if echo else uplinks[0].positions
+    frame = array_frame(positions, measurement.boresight)
+    steps = 2 + len(uplinks)
+
+    tell("estimate", 0, steps)
+    lines: tuple[FittedLine, ...] = ()
+    raw = corrected = None
+    walls: tuple[Wall, ...] = ()
+    seen: tuple[tuple[int, ...], ...] = ()
+    local_echo = None
+    if echo is None:
+        notes.append("no echo was measured, so nothing is known of mirrors")
+    else:
+        started = time.perf_counter()
+        local_echo = replace(echo, positions=frame.to_local(echo.positions))
+        lines = detect_mirrors(local_echo)
+        lines, walls, seen = _folded(lines)
+        timings["mirrors"] = time.perf_counter() - started
+    tell("estimate", 1, steps)
+
+    users, maps = [], []
+    for index, uplink in enumerate(uplinks):
+        started = time.perf_counter()
+        local = replace(uplink, positions=frame.to_local(uplink.positions))
+        looked = angle_range_map(
+            local,
+            aoa=default_angles(local, cells=MAP_SAMPLES),
+            path_length=default_path_lengths(local, cells=MAP_SAMPLES),
+            centre=np.zeros(3),
+        )
+        maps.append(looked)
+        found = decide(
+            uplink.user,
+            find_paths(local, looked),
+            walls,
+            cell=echo_resolution(local_echo).across_ray if local_echo else 0.0,
+            imaged=local_echo is not None,
+        )
+        users.append(_in_world(found, frame))
+        timings[f"user {uplink.user}"] = time.perf_counter() - started
+        tell("estimate", 2 + index, steps)
+
+    if local_echo is not None:
+        started = time.perf_counter()
+        ends = [frame.to_local(user.path) for user in users if user.path is not None]
+        raw, corrected = _images(local_echo, frame, walls, seen, ends)
+        timings["images"] = time.perf_counter() - started
+    tell("estimate", steps, steps)
+    return Estimate(
+        users=tuple(users),
+        mirrors=tuple(
+            _mirror(frame, line, wall, through)
+            for line, wall, through in zip(lines, walls, seen, strict=True)
+        ),
+        raw_image=raw,
+        corrected_image=corrected,
+        maps=tuple(maps),
+        notes=tuple(notes),
+        timings=timings,
+    )
+
+
+def _on_our_clock(measurement: Measurement) -> tuple[Uplink, ...]:
+    """Take a known offset of the user's clock out of its pilot.
+
+    A clock that is ahead by δ sends early: the pilot's delay appears δ too short.
+    """
+    offset = measurement.clock_offset or 0.0
+    return tuple(
+        replace(
+            uplink,
+            samples=uplink.samples * np.exp(-2j * np.pi * uplink.frequencies * offset),
+        )
+        for uplink in measurement.uplinks
+    )
+
+
+def _folded(
+    lines: Sequence[FittedLine],
+) -> tuple[tuple[FittedLine, ...], tuple[Wall, ...], tuple[tuple[int, ...], ...]]:
+    """Fold lines that are seen through others; those seen directly come first.
+
+    A line whose midpoint is hidden behind a mirror is a wall's ghost: mirroring it about that
+    mirror gives its true place.
+    """
+    def hides(wall: FittedLine, line: FittedLine) -> bool:
+        far = float(np.linalg.norm(line.middle))
+        hit = crossing(np.zeros(3), line.middle / far, wall.start, wall.end)
+        return hit is not None and hit[0] < far
+
+    direct = [a for a in lines if not any(hides(b, a) for b in lines if b is not a)]
+    ordered, walls = list(direct), [_wall(line) for line in direct]
+    seen: list[tuple[int, ...]] = [()] * len(direct)
+    for line in lines:
+        if any(line is other for other in direct):
+            continue
+        through = next((i for i, wall in enumerate(direct) if hides(wall, line)), None)
+        if through is None:
+            continue  # hidden by a ghost alone: over more mirrors than are folded here
+        ordered.append(line)
+        first = walls[through]
+        ends = mirrored(np.stack([line.start, line.end]), first.start, first.end)
+        walls.append(Wall(start=ends[0], end=ends[1], covariance=line.covariance))
+        seen.append((through,))
+    return tuple(ordered), tuple(walls), tuple(seen)
+
+
+def _wall(line: FittedLine) -> Wall:
+    return Wall(start=line.start, end=line.end, covariance=line.covariance)
+
+
+def _mirror(
+    frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]
+) -> Mirror:
+    normal = np.array([line.direction[1], -line.direction[0], 0.0])
+    along = wall.end - wall.start
+    normal = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
+    middle = 0.5 * (wall.start + wall.end)
+    if normal @ middle > 0:  # towards the array
+        normal = -normal
+    return Mirror(
+        start=frame.to_world(wall.start),
+        end=frame.to_world(wall.end),
+        normal=frame.turned_to_world(normal),
+        covariance=wall.covariance,
+        confidence=line.confidence,
+        level_db=float(10 * np.log10(line.level / line.background)),
+        seen_through=through,
+    )
+
+
+def _in_world(user: UserEstimate, frame: ArrayFrame) -> UserEstimate:
+    if user.position is None or user.covariance is None or user.path is None:
+        return user
+    return replace(
+        user,
+        position=frame.to_world(user.position),
+        covariance=frame.axes.T @ user.covariance @ frame.axes,
+        path=frame.to_world(user.path),
+        alternatives=tuple(_in_world(other, frame) for other in user.alternatives),
+    )
+
+
+def _images(
+    echo: Echo,
+    frame: ArrayFrame,
+    walls: Sequence[Wall],
+    seen: Sequence[tuple[int, ...]],
+    paths: Sequence[Float[np.ndarray, "vertices 3"]],
+) -> tuple[Image, Image]:
+    """Form the raw and the corrected image on one grid, around what was found."""
+    focuser = prepare(range_profiles(echo))
+    nearest, farthest = echo_reach(echo)
+    sine = unaliased_sine(echo)
+
+    def focus_in_reach(points: Float[np.ndarray, "*grid 3"]) -> np.ndarray:
+        """Focus where range and angle are unambiguous; elsewhere there is no image: 0."""
+        distance = np.linalg.norm(points, axis=-1)
+        inside = (distance > nearest) & (distance < farthest)
+        inside &= (points[..., 1] > 0) & (np.abs(points[..., 0]) < sine * distance)
+        values = np.zeros(points.shape[:-1], dtype=np.complex128)
+        values[inside] = focus(focuser, points[inside])
+        return values
+
+    grid = _grid(echo, frame, walls, paths, farthest, sine)
+    points = frame.to_local(grid.points)
+    direct = [wall for wall, through in zip(walls, seen, strict=True) if not through]
+    raw = focus_in_reach(points)
+    corrected = corrected_image(focus_in_reach, points, direct)
+    return Image(values=raw, grid=grid), Image(values=corrected, grid=grid)
+
+
+def _grid(
+    echo: Echo,
+    frame: ArrayFrame,
+    walls: Sequence[Wall],
+    paths: Sequence[Float[np.ndarray, "vertices 3"]],
+    farthest: float,
+    sine: float,
+) -> PixelGrid:
+    """Cover the sector that can be imaged, and what is folded out of it."""
+    corners = [np.array([x * sine * farthest, y * farthest, 0.0]) for x in (-1, 1) for y in (0, 1)]
+    folded = [vertex for path in paths for vertex in path]
+    ends = [end for wall in walls for end in (wall.start, wall.end)]
+    world = frame.to_world(np.array([*corners, *folded, *ends]))
+    low, high = world.min(axis=0) - 0.05, world.max(axis=0) + 0.05
+    spacing = 0.5 * echo_resolution(echo).along_ray
+    spacing *= max(1.0, float(np.sqrt(np.prod((high - low)[:2]) / spacing**2 / PIXELS)))
+    return PixelGrid.spanning(
+        x=(float(low[0]), float(high[0])), y=(float(low[1]), float(high[1])), spacing=spacing
+    )

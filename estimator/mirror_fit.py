@@ -1,0 +1,290 @@
+r"""A wall's line below the resolution cell: maximise the image's magnitude along it.
+
+For trial lines (angle, offset) the image is focused on points of the line itself, and
+
+.. math:: J(\alpha, \rho) = \sum_s |I(p_s(\alpha, \rho))|
+
+is maximised. The magnitude, not the intensity: a few bright facets would pull the latter. Its
+summit is that of a paraboloid fitted over most of a cell: speckle makes the top itself
+ragged, and the paraboloid halves the error of the highest trial. The covariance comes from
+blocks along the wall, each with a speckle of its own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.special import gammaincc
+
+from estimator.line_search import GAP, Resolution
+
+Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
+"""Focuses the echo on points."""
+
+SAMPLES_PER_CELL = 2
+TRIALS = 9
+"""Trial angles and trial offsets of each round."""
+ROUNDS = 4
+"""Rounds; each looks at a third of the neighbourhood of the one before."""
+CELLS_PER_BLOCK = 6.0
+"""Cells in a block: neighbouring cells share speckle, blocks hardly."""
+SUMMIT = 0.6
+"""Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
+CELLS_CUT = 2.0
+"""Cells left out at either end: the sidelobes of an end, which lean, would tilt the line."""
+CELLS_AT_END = 12.0
+"""Cells whose mean is the level of the wall near its end."""
+END_LEVEL = 0.1
+"""Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
+of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedLine:
+    """A segment in the array's frame, with the statistics of its angle and offset."""
+
+    start: Float[np.ndarray, " 3"]  # [m]
+    end: Float[np.ndarray, " 3"]  # [m]
+    covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
+    level: float  # mean intensity along it [-]
+    background: float  # mean intensity beside it [-]
+    confidence: float  # one minus the probability that background alone does this
+
+    @property
+    def middle(self) -> Float[np.ndarray, " 3"]:
+        """Midpoint. [m]"""
+        return 0.5 * (self.start + self.end)
+
+    @property
+    def length(self) -> float:
+        """Length. [m]"""
+        return float(np.linalg.norm(self.end - self.start))
+
+    @property
+    def direction(self) -> Float[np.ndarray, " 3"]:
+        """Unit vector from start to end."""
+        direction: np.ndarray = (self.end - self.start) / self.length
+        return direction
+
+
+def fit_line(
+    focus: Focus,
+    tapered: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    *,
+    reach: tuple[float, float],
+    trials: int,
+) -> FittedLine | None:
+    """Refine a segment and find where it begins and ends.
+
+    Parameters
+    ----------
+    focus
+        Focuses the unweighted echo on points.
+    tapered
+        The same with low sidelobes: they would lengthen the wall.
+    start, end
+        The first guess, good to about a cell. [m]
+    resolution
+        Of the unweighted echo.
+    reach
+        Nearest and farthest distance from the array that can be focused. [m]
+    trials
+        How many lines were looked at, for the confidence.
+
+    Returns
+    -------
+    The line, or ``None`` if nothing wall-like is left on it.
+    """
+    for half_width in (1.0, 0.3):  # in cells: once for the extent, once at the final extent
+        refined = _refined(focus, start, end, resolution, half_width)
+        extent = _extent(tapered, *refined, resolution, reach)
+        if extent is None:
+            return None
+        start, end = extent
+    start, end, covariance = _summit(focus, start, end, resolution)
+    level, background = _levels(tapered, start, end, resolution)
+    cells = np.linalg.norm(end - start) / _cell_along(start, end, resolution)
+    # The mean of n exponential variables is Gamma distributed; a trial is any line tried.
+    false = float(gammaincc(cells, cells * level / background)) * trials
+    return FittedLine(
+        start=start,
+        end=end,
+        covariance=covariance,
+        level=level,
+        background=background,
+        confidence=float(np.clip(1 - false, 0.0, 1.0)),
+    )
+
+
+def _across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> np.ndarray:
+    along = (end - start) / np.linalg.norm(end - start)
+    return np.array([along[1], -along[0], 0.0])
+
+
+def _cell_along(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
+) -> float:
+    direction = (end - start) / np.linalg.norm(end - start)
+    return float(resolution.cell(0.5 * (start + end), direction))
+
+
+def _cell_across(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
+) -> float:
+    return float(resolution.cell(0.5 * (start + end), _across(start, end)))
+
+
+def _places(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
+) -> Float[np.ndarray, " places"]:
+    """Sample a segment without its very ends, measured from its midpoint. [m]"""
+    length = float(np.linalg.norm(end - start))
+    cell = _cell_along(start, end, resolution)
+    length -= min(2 * CELLS_CUT * cell, 0.5 * length)
+    count = max(2, round(SAMPLES_PER_CELL * length / cell))
+    return (np.arange(count) + 0.5) / count * length - length / 2
+
+
+def _trial_points(
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    places: Float[np.ndarray, " places"],
+    tilts: Float[np.ndarray, " tilts"],
+    offsets: Float[np.ndarray, " offsets"],
+) -> Float[np.ndarray, "tilts offsets places 3"]:
+    """Points of lines turned about the midpoint (counter-clockwise) and moved along the normal."""
+    along = (end - start) / np.linalg.norm(end - start)
+    normal = _across(start, end)
+    # The normal is the tangent turned by −90°, so a turn by δ moves the tangent by −δ·normal.
+    tangents = np.cos(tilts)[:, None] * along - np.sin(tilts)[:, None] * normal
+    normals = np.cos(tilts)[:, None] * normal + np.sin(tilts)[:, None] * along
+    middle = 0.5 * (start + end)
+    return (
+        middle
+        + offsets[None, :, None, None] * normals[:, None, None, :]
+        + places[None, None, :, None] * tangents[:, None, None, :]
+    )
+
+
+def _refined(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    half_width: float,
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Maximise J over a neighbourhood of so many cells, by ever finer grids."""
+    places = _places(start, end, resolution)
+    width = half_width * _cell_across(start, end, resolution)
+    length = float(np.linalg.norm(end - start))
+    tilt = offset = 0.0
+    for _ in range(ROUNDS):
+        tilts = tilt + np.linspace(-2, 2, TRIALS) * width / length
+        offsets = offset + np.linspace(-1, 1, TRIALS) * width
+        magnitude = np.abs(focus(_trial_points(start, end, places, tilts, offsets)))
+        objective = magnitude.sum(axis=-1)
+        row, column = np.unravel_index(int(np.argmax(objective)), objective.shape)
+        tilt, offset = float(tilts[row]), float(offsets[column])
+        width /= 3
+    ends = _trial_points(
+        start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
+    )[0, 0]
+    return ends[0], ends[1]
+
+
+def _extent(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    reach: tuple[float, float],
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]] | None:
+    """Follow the line both ways until more than :data:`GAP` cells are dark."""
+    along = (end - start) / np.linalg.norm(end - start)
+    middle = 0.5 * (start + end)
+    step = _cell_along(start, end, resolution) / SAMPLES_PER_CELL
+    count = int(np.ceil(np.linalg.norm(end - start) / step)) + 1
+    more = count  # as far again on either side
+    places = (np.arange(-more, count + more) - (count - 1) / 2) * step
+    points = middle + places[:, None] * along
+    distance = np.linalg.norm(points, axis=-1)
+    inside = (distance > reach[0]) & (distance < reach[1]) & (points[:, 1] > 0)
+    places, points = places[inside], points[inside]
+    intensity = np.abs(focus(points)) ** 2
+    within = np.abs(places) <= np.linalg.norm(end - start) / 2
+    level = float(np.median(intensity[within])) / np.log(2)
+    background = _levels(focus, start, end, resolution)[1]
+    # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
+    occupied = np.nonzero(intensity > np.sqrt(level * background))[0]
+    if not within.any() or level < background or len(occupied) == 0:
+        return None
+    runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
+    run = max(runs, key=len)
+    if len(run) < 2 or len(run) < 0.3 * (run[-1] - run[0] + 1):
+        return None
+    near = round(CELLS_AT_END * SAMPLES_PER_CELL)
+    ends = []
+    for inward in (run, run[::-1]):
+        local = intensity[inward[:near]]
+        bright = inward[:near][local > END_LEVEL * np.median(local) / np.log(2)]
+        ends.append(middle + places[bright[0]] * along)
+    return ends[0], ends[1]
+
+
+def _summit(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]]:
+    r"""Move the line to the summit of J and return it with the covariance of its place.
+
+    J is a sum over blocks b, near the summit :math:`c_b + g_b^T x + x^T H_b x / 2` each. With
+    independent blocks the covariance of the summit is the sandwich
+    :math:`H^{-1} (\sum s_b s_b^T) H^{-1}`, :math:`s_b = g_b + H_b x`.
+    """
+    places = _places(start, end, resolution)
+    length = float(np.linalg.norm(end - start))
+    width = SUMMIT * _cell_across(start, end, resolution)
+    scale = np.array([2 * width / length, width])
+    unit = np.linspace(-1, 1, TRIALS)
+    points = _trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
+    magnitude = np.abs(focus(points))
+    count = int(np.clip(length / (CELLS_PER_BLOCK * _cell_along(start, end, resolution)), 4, 40))
+    blocks = np.stack(
+        [part.sum(axis=-1) for part in np.array_split(magnitude, count, axis=-1)], axis=-1
+    ).reshape(-1, count)
+    x, y = (axis.ravel() for axis in np.meshgrid(unit, unit, indexing="ij"))
+    basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=-1)
+    fits = np.linalg.lstsq(basis, blocks)[0]
+    hessians = fits[[3, 4, 4, 5]].reshape(2, 2, count)
+    bread = np.linalg.inv(hessians.sum(axis=-1))
+    summit = np.clip(-bread @ fits[1:3].sum(axis=-1), -1.0, 1.0)
+    scores = fits[1:3] + np.einsum("ijb,j->ib", hessians, summit)
+    covariance = count / (count - 2) * bread @ (scores @ scores.T) @ bread
+    tilt, offset = scale * summit
+    ends = _trial_points(
+        start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
+    )[0, 0]
+    return ends[0], ends[1], covariance * np.outer(scale, scale)
+
+
+def _levels(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+) -> tuple[float, float]:
+    """Mean intensity along the line, and the median-based one of lines beside it."""
+    places = _places(start, end, resolution)
+    cell = _cell_across(start, end, resolution)
+    beside = cell * np.array([-12.0, -10.0, -8.0, -6.0, 0.0, 6.0, 8.0, 10.0, 12.0])
+    points = _trial_points(start, end, places, np.zeros(1), beside)[0]
+    intensity = np.abs(focus(points)) ** 2
+    on = len(beside) // 2
+    around = np.delete(intensity, on, axis=0)
+    return float(intensity[on].mean()), float(np.median(around) / np.log(2))

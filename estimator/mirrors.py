@@ -1,0 +1,136 @@
+"""Mirrors: the walls that an image shows, found without help."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.signal.windows import taylor
+
+from estimator.backprojection import backproject, focus, prepare
+from estimator.line_search import Resolution, find_lines, significant_peaks
+from estimator.measurement import Echo, frequency_step
+from estimator.mirror_fit import FittedLine, fit_line
+from estimator.range_profiles import range_profiles
+
+SIDELOBE_LEVEL_DB = 50
+"""Sidelobes of the survey's taper, below :data:`estimator.line_search.DYNAMIC_RANGE`. [dB]"""
+
+LEAST_CONFIDENCE = 0.999
+LEAST_CELLS = 8.0
+"""Shortest mirror; shorter ones have no angle to speak of. [cells]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Survey:
+    """A tapered image on a polar grid, uniform in range and in the sine of the azimuth."""
+
+    values: Complex[np.ndarray, "ranges sines"]
+    points: Float[np.ndarray, "ranges sines 3"]  # in the array's frame [m]
+
+
+def echo_resolution(echo: Echo) -> Resolution:
+    """Return c/2B along the ray and λ/2D across it, of an echo in the array's frame."""
+    band = float(echo.frequencies[-1] - echo.frequencies[0])
+    wavelength = speed_of_light / float(echo.frequencies.mean())
+    aperture = float(np.ptp(echo.positions[:, 0]))
+    return Resolution(
+        along_ray=speed_of_light / (2 * band), across_ray=wavelength / (2 * aperture)
+    )
+
+
+def echo_reach(echo: Echo) -> tuple[float, float]:
+    """Return the distances between which an echo can be imaged: the aperture, and c/2Δf. [m]"""
+    aperture = float(np.ptp(echo.positions[:, 0]))
+    farthest = speed_of_light / (2 * frequency_step(echo.frequencies)) - 1.1 * aperture
+    return 0.5 * aperture, farthest
+
+
+def unaliased_sine(echo: Echo) -> float:
+    """Return the largest |sin φ| that the positions sample without alias, λ_min/(4Δx)."""
+    spacing = float(np.ptp(echo.positions[:, 0])) / (len(echo.positions) - 1)
+    return min(0.95, speed_of_light / float(echo.frequencies[-1]) / (4 * spacing))
+
+
+def survey(echo: Echo) -> Survey:
+    """Image everything within reach, at half the resolution of a low-sidelobe taper.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+    """
+    resolution = echo_resolution(echo)
+    nearest, farthest = echo_reach(echo)
+    ranges = np.arange(nearest, farthest, 0.75 * resolution.along_ray)
+    limit = unaliased_sine(echo)
+    count = 2 * int(np.ceil(limit / (0.75 * resolution.across_ray))) + 1
+    sines = np.linspace(-limit, limit, count)
+    points = np.zeros((ranges.size, count, 3))
+    points[..., 0] = ranges[:, None] * sines
+    points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
+    values = backproject(echo, points, weights=_taper_weights(echo))
+    return Survey(values=values, points=points)
+
+
+def _taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
+    return np.outer(_taper(len(echo.positions)), _taper(echo.frequencies.size))
+
+
+def _taper(count: int) -> Float[np.ndarray, " count"]:
+    weights: np.ndarray = taylor(count, nbar=6, sll=SIDELOBE_LEVEL_DB, norm=True)
+    return weights
+
+
+def detect_mirrors(echo: Echo) -> tuple[FittedLine, ...]:
+    """Find the walls that the image shows; the strongest first.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+
+    Returns
+    -------
+    Lines whose confidence is at least :data:`LEAST_CONFIDENCE`. Nothing tells here whether
+    one is seen directly or through another.
+    """
+    looked = survey(echo)
+    resolution = echo_resolution(echo)
+    # The taper widens the resolution by about 1.4.
+    coarse = Resolution(
+        along_ray=1.4 * resolution.along_ray, across_ray=1.4 * resolution.across_ray
+    )
+    peaks = significant_peaks(np.abs(looked.values) ** 2, looked.points)
+    candidates = find_lines(peaks, coarse)
+    plain = prepare(range_profiles(echo))
+    tapered = prepare(range_profiles(echo, weights=_taper_weights(echo)))
+    reach = echo_reach(echo)
+    trials = looked.values.shape[0] * looked.values.shape[1]
+    lines: list[FittedLine] = []
+    for candidate in candidates:
+        middle = 0.5 * (candidate.start + candidate.end)
+        if any(_lies_on(middle, line, coarse) for line in lines):
+            continue  # a part of a wall that was followed to its ends already
+        line = fit_line(
+            lambda points: focus(plain, points),
+            lambda points: focus(tapered, points),
+            candidate.start,
+            candidate.end,
+            resolution,
+            reach=(0.5 * reach[0], reach[1]),
+            trials=trials,
+        )
+        if line is None or line.confidence < LEAST_CONFIDENCE:
+            continue
+        if line.length < LEAST_CELLS * float(resolution.cell(line.middle, line.direction)):
+            continue
+        lines.append(line)
+    return tuple(sorted(lines, key=lambda line: -line.level))
+
+
+def _lies_on(point: Float[np.ndarray, " 3"], line: FittedLine, resolution: Resolution) -> bool:
+    normal = np.array([line.direction[1], -line.direction[0], 0.0])
+    beside = abs(float((point - line.middle) @ normal))
+    along = abs(float((point - line.middle) @ line.direction))
+    return beside < 2 * float(resolution.cell(point, normal)) and along < 0.5 * line.length

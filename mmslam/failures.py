@@ -1,0 +1,58 @@
+"""What the user did wrong becomes one message and exit code 2; a bug keeps its traceback."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+
+import typer
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+@contextlib.contextmanager
+def told_clearly() -> Iterator[None]:
+    """Turn bad input into its message and exit code 2, Ctrl-C into exit code 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _say("interrupted; nothing was written")
+        raise typer.Exit(INTERRUPTED) from None
+    except Exception as error:
+        if not isinstance(error, _users_errors()):
+            raise
+        _say(f"error: {error}")
+        raise typer.Exit(BAD_INPUT) from None
+
+
+@contextlib.contextmanager
+def stdout_kept_clean() -> Iterator[None]:
+    """Send to stderr whatever is printed meanwhile, by C++ libraries too.
+
+    Mitsuba and LLVM write to the file descriptor, which no replacement of ``sys.stdout``
+    reaches.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _say(message: str) -> None:
+    typer.echo(f"mmslam: {message}", err=True)
+
+
+def _users_errors() -> tuple[type[Exception], ...]:
+    # Imported here: only a failure pays for pydantic and jaxtyping.
+    from estimator.engine import EngineError
+    from estimator.measurement import MeasurementError
+    from mmslam.output import OutputError
+    from scenes.scenario import ScenarioError
+
+    return EngineError, MeasurementError, OutputError, ScenarioError

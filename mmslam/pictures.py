@@ -1,0 +1,175 @@
+"""The pictures of one result, composed of the figures' parts and saved as PNG."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from estimator.estimate import Estimate, Image
+from estimator.measurement import Measurement
+from mmslam import output
+from validation import figures
+from validation.truth import Truth
+
+DOTS_PER_INCH = 150
+_CLOSE_UPS = 3  # users shown enlarged; more would be too small to read
+
+
+def write_pictures(
+    folder: Path, measurement: Measurement, estimate: Estimate, truth: Truth
+) -> dict[str, Path]:
+    """Draw what an estimate holds and save it.
+
+    Parameters
+    ----------
+    folder
+        Where the files go.
+    measurement, estimate, truth
+        What is drawn; the truth is marked only if it is known.
+
+    Returns
+    -------
+    The files by their names; what was not measured (no echo, no uplink) has no picture.
+    """
+    positions = aperture(measurement)
+    drawn: dict[str, Figure] = {}
+    for name, image in zip(
+        output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
+    ):
+        if image is not None:
+            drawn[name] = image_figure(image, estimate, positions, corrected="corrected" in name)
+    if estimate.maps:
+        drawn["angle_range_map.png"] = angle_range_figure(estimate)
+    drawn["localization.png"] = localization_figure(estimate, positions, truth)
+    paths = {}
+    for name, figure in drawn.items():
+        paths[name] = folder / name
+        save(figure, paths[name])
+    return paths
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Save a figure as PNG, the same bytes for the same figure and versions."""
+    figure.savefig(path, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
+
+
+def aperture(measurement: Measurement) -> Float[np.ndarray, "positions 3"]:
+    """Return the phase centres of the echo, or else of the first uplink [m]."""
+    measured = measurement.echo or measurement.uplinks[0]
+    return measured.positions
+
+
+def image_figure(
+    image: Image,
+    estimate: Estimate,
+    positions: Float[np.ndarray, "positions 3"],
+    *,
+    corrected: bool,
+) -> Figure:
+    """Draw a SAR image: raw with the mirrors over it, corrected with all that was found."""
+    shown = estimate if corrected else Estimate(users=(), mirrors=estimate.mirrors)
+    points = [figures.estimate_points(shown, positions), figures.bright_points(image)]
+    view = figures.view_around(np.concatenate(points))
+    figure = _figure(view, extra_width=1.1)
+    ax = figures.draw_image(figure.subplots(), image, view=view)
+    figures.overlay_mirrors(ax, estimate.mirrors)
+    figures.overlay_array(ax, positions, colour=figures.ON_DARK)
+    if corrected:
+        figures.overlay_targets(ax, estimate.targets)
+        for user in estimate.users:
+            if user.path is not None:
+                ax.plot(user.path[:, 0], user.path[:, 1], color=figures.PATH, lw=1.2)
+        figures.overlay_users(ax, estimate.users)
+    ax.set_title(
+        "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
+    )
+    return figure
+
+
+def angle_range_figure(estimate: Estimate) -> Figure:
+    """Draw the angle/range map of every user, one beside the other."""
+    users = {user.name: user for user in estimate.users}
+    count = len(estimate.maps)
+    figure = Figure(figsize=(1.2 + 5.8 * count, 5.2), layout="constrained")
+    for ax, heard in zip(np.atleast_1d(figure.subplots(1, count)).flat, estimate.maps, strict=True):
+        figures.draw_angle_range_map(ax, heard, users.get(heard.user))
+        ax.set_title(f"Uplink of {heard.user}")
+    return figure
+
+
+def localization_figure(
+    estimate: Estimate, positions: Float[np.ndarray, "positions 3"], truth: Truth
+) -> Figure:
+    """Draw the plan of what was found, and each user enlarged with its error ellipse."""
+    true_positions = list(truth.user_position.values())
+    true_walls = [
+        np.stack([start, truth.wall_end[name]])
+        for name, start in truth.wall_start.items()
+        if name in truth.wall_end
+    ]
+    points = np.concatenate(
+        [
+            figures.estimate_points(estimate, positions),
+            *(place[None] for place in true_positions),
+            *true_walls,
+        ]
+    )
+    found = [user for user in estimate.users if user.position is not None][:_CLOSE_UPS]
+    view = figures.view_around(points)
+    figure = _figure(view, extra_width=3.6 if found else 0.0, extra_height=0.5)
+    columns = figure.add_gridspec(1, 2 if found else 1, width_ratios=[2.1, 1][: 1 + bool(found)])
+    ax = figures.draw_localization(
+        figure.add_subplot(columns[0]),
+        estimate,
+        positions,
+        view=view,
+        true_positions=true_positions,
+        true_walls=true_walls,
+    )
+    ax.set_title("What was found")
+    if found:
+        rows = columns[1].subgridspec(len(found), 1)
+        for row, user in enumerate(found):
+            figures.draw_close_up(
+                figure.add_subplot(rows[row]), user, truth.user_position.get(user.name)
+            )
+    silent = [f"{user.name}: {user.status}" for user in estimate.users if user.position is None]
+    if silent:
+        ax.text(0.02, 0.98, "\n".join(silent), transform=ax.transAxes, va="top", color=figures.USER)
+    figure.legend(
+        handles=list(_legend(estimate, bool(true_positions or true_walls))),
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=9,
+    )
+    return figure
+
+
+def _legend(estimate: Estimate, truth_known: bool) -> Iterable[Line2D]:
+    if estimate.mirrors:
+        yield Line2D([], [], color=figures.MIRROR, ls="--", lw=1.8, label="mirror")
+    if any(user.path is not None for user in estimate.users):
+        yield Line2D([], [], color=figures.PATH, lw=1.6, label="path")
+    if any(user.position is not None for user in estimate.users):
+        yield Line2D(
+            [], [], color=figures.USER, marker="o", ls="", label=r"user, 1$\sigma$ and 2$\sigma$"
+        )
+    if truth_known:
+        yield Line2D(
+            [], [], color=figures.INK, marker="o", mfc="none", ms=9, ls="", label="true user"
+        )
+        yield Line2D([], [], color="#c9d1d6", lw=7, label="true wall")
+
+
+def _figure(view: figures.View, *, extra_width: float = 0.0, extra_height: float = 0.0) -> Figure:
+    """Make a figure whose main axes fit the view's shape without white borders."""
+    width = 6.4 if view.aspect >= 1 else max(6.4 * view.aspect, 3.2)
+    height = width / view.aspect
+    return Figure(
+        figsize=(width + 0.9 + extra_width, min(height, 9.0) + 0.9 + extra_height),
+        layout="constrained",
+    )

@@ -1,0 +1,120 @@
+"""Joins the packages: scenario, measurement, estimate, comparison, figures, report."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimator.estimate import Estimate, Progress
+from estimator.localization import locate
+from estimator.measurement import Measurement
+from estimator.storage import read_measurement, write_measurement
+from mmslam import output
+from mmslam.result import result_document, to_json
+from scenes.scenario import Scenario
+from validation.truth import Truth, read_truth, truth_from_dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a command has written, and where."""
+
+    folder: Path
+    result: Mapping[str, Any]
+
+
+def run_scenario(
+    scenario: Scenario, *, seed: int, folder: Path, progress: Progress | None = None
+) -> Outcome:
+    """Simulate a scenario, estimate what is in it, and write everything to a folder.
+
+    Parameters
+    ----------
+    scenario
+        What is simulated.
+    seed
+        Of roughness and noise.
+    folder
+        Is replaced as a whole once all is done; refused before any work if it is foreign.
+    progress
+        Told each stage's steps.
+    """
+    with output.replacing(folder, output.refuse_foreign_results) as new:
+        from simulator.simulation import simulate  # Sionna's import takes seconds
+
+        new.mkdir()
+        started = time.perf_counter()
+        simulation = simulate(scenario, seed=seed, progress=progress)
+        timings = {"simulate": time.perf_counter() - started}
+        measurement = simulation.measurement
+        started = time.perf_counter()
+        write_measurement(new / output.MEASUREMENT, measurement, truth=simulation.truth)
+        timings["write_measurement"] = time.perf_counter() - started
+        truth = truth_from_dataset(simulation.truth)
+        estimate = locate(measurement, progress=progress)
+        result = _write_results(new, measurement, estimate, truth, timings, scenario)
+    return Outcome(folder=folder, result=result)
+
+
+def locate_measurement(
+    path: Path, *, sample: int | None, folder: Path | None, progress: Progress | None = None
+) -> Outcome:
+    """Estimate what is in a measurement file, and write it to a folder.
+
+    Parameters
+    ----------
+    path
+        The measurement store; its truth, if any, is opened after the estimate only.
+    sample
+        Which one of a dataset.
+    folder
+        As in :func:`run_scenario`; None: ``out/SCENARIO-SEED-located``.
+    progress
+        Told each stage's steps.
+    """
+    measurement = read_measurement(path, sample=sample)
+    folder = folder or default_folder(measurement, path, sample)
+    if path.resolve().is_relative_to(folder.resolve()):
+        raise output.OutputError(
+            f"{folder} holds the measurement {path} itself, which would be replaced; "
+            "choose another folder with --out"
+        )
+    with output.replacing(folder, output.refuse_foreign_results) as new:
+        new.mkdir()
+        estimate = locate(measurement, progress=progress)
+        truth = read_truth(path, sample=sample)
+        result = _write_results(new, measurement, estimate, truth, {}, None)
+    return Outcome(folder=folder, result=result)
+
+
+def default_folder(measurement: Measurement, path: Path, sample: int | None) -> Path:
+    """Name the folder for the estimate of a file: never the one of the run that wrote it."""
+    parts = [measurement.scenario or path.stem]
+    if measurement.seed is not None:
+        parts.append(str(measurement.seed))
+    if sample is not None:
+        parts.append(f"sample{sample}")
+    return Path("out") / "-".join([*parts, "located"])
+
+
+def _write_results(
+    new: Path,
+    measurement: Measurement,
+    estimate: Estimate,
+    truth: Truth,
+    timings: dict[str, float],
+    scenario: Scenario | None,
+) -> Mapping[str, Any]:
+    # matplotlib's import takes half a second that other commands need not wait.
+    from mmslam.pictures import write_pictures
+    from mmslam.report import render_report
+
+    started = time.perf_counter()
+    pictures = write_pictures(new, measurement, estimate, truth)
+    timings = {**timings, "figures": time.perf_counter() - started}
+    result = result_document(measurement, estimate, truth, timings=timings)
+    report = render_report(result, measurement, pictures, scenario=scenario)
+    (new / output.REPORT).write_text(report, encoding="utf-8")
+    (new / output.RESULT).write_text(to_json(result), encoding="utf-8")
+    return result

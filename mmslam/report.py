@@ -1,0 +1,103 @@
+"""The report: one self-contained page with the figures inside."""
+
+import base64
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from scipy.constants import speed_of_light
+
+from estimator.measurement import Measurement
+from scenes.library import scenario_to_toml
+from scenes.scenario import Scenario
+
+CAPTIONS = {
+    "localization.png": "Plan of what was found; the user enlarged, with its error ellipses.",
+    "corrected_image.png": "The image after each ghost was folded back through its mirror.",
+    "raw_image.png": "The image as measured, ghosts behind the mirrors included.",
+    "angle_range_map.png": "The user's pilot over angle of arrival and path length.",
+}
+
+
+def render_report(
+    result: Mapping[str, Any],
+    measurement: Measurement,
+    pictures: Mapping[str, Path],
+    *,
+    scenario: Scenario | None = None,
+) -> str:
+    """Write the page that tells one result.
+
+    Parameters
+    ----------
+    result
+        The document of ``result.json``.
+    measurement
+        What it was made from; its radio parameters are listed.
+    pictures
+        PNG files by name; they are embedded.
+    scenario
+        What was simulated, if anything; its TOML text is included.
+
+    Returns
+    -------
+    HTML that needs no other file and no network.
+    """
+    environment = Environment(
+        loader=PackageLoader("mmslam"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["fixed"] = _fixed
+    environment.filters["triple"] = _triple
+    environment.filters["deviation"] = _deviation
+    return environment.get_template("report.html.j2").render(
+        result=result,
+        radio=radio_parameters(measurement),
+        figures=[
+            {
+                "source": base64.b64encode(pictures[name].read_bytes()).decode("ascii"),
+                "caption": caption,
+                "name": name,
+            }
+            for name, caption in CAPTIONS.items()
+            if name in pictures
+        ],
+        scenario=None if scenario is None else scenario_to_toml(scenario),
+    )
+
+
+def radio_parameters(measurement: Measurement) -> dict[str, str]:
+    """Describe the sweep in the units that people use, each with its unit."""
+    measured = measurement.echo or measurement.uplinks[0]
+    frequencies, positions = measured.frequencies, measured.positions
+    described = {
+        "frequencies": f"{frequencies[0] / 1e9:g} to {frequencies[-1] / 1e9:g} GHz, "
+        f"{frequencies.size} points",
+        "positions": f"{len(positions)} over "
+        f"{1e3 * np.linalg.norm(np.ptp(positions, axis=0)):.1f} mm",
+        "waves": measurement.waves,
+    }
+    if frequencies.size > 1:
+        bandwidth = frequencies[-1] - frequencies[0]
+        step = bandwidth / (frequencies.size - 1)
+        described["range resolution c/2B"] = f"{1e3 * speed_of_light / (2 * bandwidth):.2f} mm"
+        described["unambiguous one-way path"] = f"{speed_of_light / step:.2f} m"
+    return described
+
+
+def _fixed(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
+    return "—" if value is None else f"{value * scale:.{digits}f}"
+
+
+def _triple(values: list[float] | None, digits: int = 4) -> str:
+    return "—" if values is None else ", ".join(f"{value:.{digits}f}" for value in values)
+
+
+def _deviation(variance: float | None, scale: float) -> float | None:
+    return None if variance is None else scale * math.sqrt(max(variance, 0.0))

@@ -1,0 +1,174 @@
+"""The result as one JSON document: SI, null where unknown, the same bytes for the same run."""
+
+import json
+import math
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from platform import python_version
+from typing import Any
+
+import numpy as np
+
+from estimator import engine
+from estimator.estimate import Estimate, Mirror, UserEstimate
+from estimator.measurement import Measurement
+from mmslam.output import FORMAT
+from validation.metrics import WallError, position_error, wall_errors
+from validation.truth import Truth
+
+PACKAGES = (
+    "mmslam",
+    "drjit",
+    "finufft",
+    "karellen-llvm-core",
+    "mitsuba",
+    "numpy",
+    "scipy",
+    "sionna-rt",
+    "xarray",
+    "zarr",
+)
+"""The packages whose version may change a result."""
+
+_FLATNESS = 1e-9  # of an aperture, over its length: below it, rounding makes a plane of a line
+
+
+def result_document(
+    measurement: Measurement,
+    estimate: Estimate,
+    truth: Truth,
+    *,
+    timings: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """Lay out what was found, and how far it is from the truth where that is known.
+
+    Parameters
+    ----------
+    measurement
+        What the estimate was made from.
+    estimate
+        What was found.
+    truth
+        What it is compared with; users in it that the measurement lacks are listed as not found.
+    timings
+        Stages besides the estimator's own. [s]
+    """
+    heard = {user.name for user in estimate.users}
+    unheard = [
+        UserEstimate(name=name, status="not_found", reason="the measurement holds no uplink of it")
+        for name in truth.user_position
+        if name not in heard
+    ]
+    errors = wall_errors(estimate.mirrors, truth)
+    document = {
+        "format": FORMAT,
+        "scenario": measurement.scenario,
+        "seed": measurement.seed,
+        "dimensions": dimensions(measurement),
+        "waves": measurement.waves,
+        "backend": engine.backend(),
+        "versions": versions(),
+        "users": [_user(user, truth) for user in (*estimate.users, *unheard)],
+        "mirrors": [_mirror(mirror) for mirror in estimate.mirrors],
+        "targets": [
+            {
+                "position_m": target.position,
+                "ghost_m": target.ghost,
+                "seen_through": target.seen_through,
+            }
+            for target in estimate.targets
+        ],
+        "comparison": {
+            "mirrors": [_wall_error(error) for error in errors],
+            "walls_missed": sorted(
+                set(truth.wall_start) - {error.wall for error in errors if error is not None}
+            ),
+        },
+        "notes": estimate.notes,
+        "timings_s": {**(timings or {}), **estimate.timings},
+    }
+    plain = _plain(document)
+    assert isinstance(plain, dict)
+    return plain
+
+
+def to_json(document: Mapping[str, Any]) -> str:
+    """Write a document as JSON text; NaN is refused, it must have become null before."""
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def versions() -> dict[str, str | None]:
+    """Return the versions of Python and of :data:`PACKAGES`, None where one is absent."""
+    found: dict[str, str | None] = {"python": python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = None
+    return found
+
+
+def dimensions(measurement: Measurement) -> int:
+    """Return 2 if the aperture is a line (its answer lies in the plane z = 0), else 3."""
+    positions = np.concatenate(
+        [part.positions for part in (measurement.echo, *measurement.uplinks) if part is not None]
+    )
+    sizes = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return 2 if sizes[1] <= _FLATNESS * sizes[0] else 3
+
+
+def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:
+    true_position = truth.user_position.get(user.name)
+    return {
+        "name": user.name,
+        "status": user.status,
+        "reason": user.reason,
+        "estimate_m": user.position,
+        "covariance_m2": user.covariance,
+        "bounces": user.bounces,
+        "aoa_deg": None if user.aoa is None else math.degrees(user.aoa),
+        "range_m": user.path_length,
+        "path_m": user.path,
+        "truth_m": true_position,
+        "error_m": position_error(user.position, true_position),
+        "alternatives": [_user(other, truth) for other in user.alternatives],
+    }
+
+
+def _mirror(mirror: Mirror) -> dict[str, Any]:
+    return {
+        "start_m": mirror.start,
+        "end_m": mirror.end,
+        "normal": mirror.normal,
+        "covariance": mirror.covariance,  # of the angle [rad] and the offset [m]
+        "confidence": mirror.confidence,
+        "level_db": mirror.level_db,
+        "seen_through": mirror.seen_through,
+    }
+
+
+def _wall_error(error: WallError | None) -> dict[str, Any]:
+    if error is None:
+        return {"truth_name": None, "angle_error_deg": None, "offset_error_m": None}
+    return {
+        "truth_name": error.wall,
+        "angle_error_deg": math.degrees(error.angle),
+        "offset_error_m": error.offset,
+        "covered": error.covered,
+        "overhang_m": error.overhang,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Turn arrays and tuples into lists, NumPy numbers into Python's, NaN and inf into None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -1,0 +1,94 @@
+"""Listing, drawing and exporting scenarios."""
+
+import json
+from pathlib import Path
+
+import typer
+
+from mmslam.output import OutputError
+from scenes.library import load_scenario, scenario_names, scenario_to_toml
+from scenes.scenario import Scenario
+
+
+def list_scenarios(*, export: Path | None, as_json: bool) -> None:
+    """Print the built-in scenarios, and export all of them if a folder is given."""
+    scenarios = [load_scenario(name, []) for name in scenario_names()]
+    for scenario in scenarios if export else ():
+        _export(scenario, export)
+    if as_json:
+        listed = [{"name": found.name, "title": found.title} for found in scenarios]
+        typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
+        return
+    width = max((len(scenario.name) for scenario in scenarios), default=0)
+    for scenario in scenarios:
+        typer.echo(f"{scenario.name:<{width}}  {scenario.title}")
+
+
+def show_scenario(
+    scenario: Scenario, *, picture: Path | None, export: Path | None, as_json: bool
+) -> None:
+    """Print a scenario, or draw it, or export it.
+
+    Parameters
+    ----------
+    scenario
+        What is shown.
+    picture
+        PNG file for its plan; its path is printed instead of the scenario.
+    export
+        Folder for its TOML file; likewise.
+    as_json
+        Whether the scenario is printed as JSON, not as TOML.
+    """
+    written = []
+    if picture is not None:
+        written.append(_draw(scenario, picture))
+    if export is not None:
+        written.append(_export(scenario, export))
+    if as_json:
+        document = json.loads(scenario.model_dump_json())  # infinity becomes null
+        if written:
+            document = {"files": [str(path) for path in written], "scenario": document}
+        typer.echo(json.dumps(document, indent=2, ensure_ascii=False))
+    elif written:
+        for path in written:
+            typer.echo(path)
+    else:
+        typer.echo(scenario_to_toml(scenario).rstrip())
+
+
+def _export(scenario: Scenario, folder: Path | None) -> Path:
+    assert folder is not None
+    path = folder / f"{scenario.name}.toml"
+    text = scenario_to_toml(scenario)
+    if path.exists() and path.read_text(encoding="utf-8") != text:
+        raise OutputError(
+            f"{path} exists with other content; move it away or choose another folder"
+        )
+    _write(path, text.encode("utf-8"))
+    return path
+
+
+def _draw(scenario: Scenario, path: Path) -> Path:
+    import io
+
+    from matplotlib.figure import Figure
+
+    from mmslam.pictures import DOTS_PER_INCH
+    from validation.scenario_plan import draw_scenario
+
+    figure = Figure(figsize=(8, 7), layout="constrained")
+    ax = draw_scenario(figure.subplots(), scenario)
+    ax.set_title(scenario.title or scenario.name)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
+    _write(path, drawn.getvalue())
+    return path
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose another place") from error

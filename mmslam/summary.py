@@ -1,0 +1,82 @@
+"""The result in a few lines of plain text, for a terminal."""
+
+from collections.abc import Iterator, Mapping
+from math import degrees, sqrt
+from pathlib import Path
+from typing import Any
+
+from estimator.measurement import Measurement
+from mmslam import output
+
+
+def summary_lines(result: Mapping[str, Any], folder: Path) -> Iterator[str]:
+    """Tell a result: users first, then mirrors and targets, notes, and where the files lie.
+
+    Parameters
+    ----------
+    result
+        The document of ``result.json``.
+    folder
+        Where it was written.
+    """
+    yield from (_user(user) for user in result["users"])
+    comparisons = result["comparison"]["mirrors"]
+    for index, (mirror, error) in enumerate(zip(result["mirrors"], comparisons, strict=True)):
+        yield _mirror(index, mirror, error)
+    if not result["mirrors"]:
+        yield "no mirror found"
+    for index, target in enumerate(result["targets"]):
+        yield f"target {index}: at {_point(target['position_m'])}"
+    for name in result["comparison"]["walls_missed"]:
+        yield f"not found: the true wall {name!r}"
+    yield from (f"note: {note}" for note in result["notes"])
+    seconds = sum(result["timings_s"].values())
+    yield f"{seconds:.1f} s; open {folder / output.REPORT}"
+
+
+def measurement_summary(measurement: Measurement) -> dict[str, Any]:
+    """Count what a measurement holds."""
+    measured = measurement.echo or measurement.uplinks[0]
+    return {
+        "scenario": measurement.scenario,
+        "seed": measurement.seed,
+        "positions": len(measured.positions),
+        "frequencies": len(measured.frequencies),
+        "echo": measurement.echo is not None,
+        "users": [uplink.user for uplink in measurement.uplinks],
+    }
+
+
+def _user(user: Mapping[str, Any]) -> str:
+    status = str(user["status"]).replace("_", " ")
+    if user["estimate_m"] is None:
+        return f"{user['name']}: {status}" + (f" ({user['reason']})" if user["reason"] else "")
+    line = f"{user['name']}: {status} at {_point(user['estimate_m'])}"
+    if user["covariance_m2"] is not None:
+        spread = sqrt(sum(user["covariance_m2"][axis][axis] for axis in range(3)))
+        line += f" ± {1e3 * spread:.2f} mm"
+    if user["aoa_deg"] is not None:
+        line += f", angle {user['aoa_deg']:.3f}°, path {user['range_m']:.4f} m"
+    if user["bounces"] is not None:
+        line += f", {user['bounces']} bounce{'' if user['bounces'] == 1 else 's'}"
+    if user["error_m"] is not None:
+        line += f"; {1e3 * user['error_m']:.2f} mm from the truth"
+    return line + (f" ({user['reason']})" if user["reason"] else "")
+
+
+def _mirror(index: int, mirror: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+    angle, offset = (mirror["covariance"][axis][axis] for axis in range(2))
+    line = (
+        f"mirror {index}: {_point(mirror['start_m'])} to {_point(mirror['end_m'])}, "
+        f"± {degrees(sqrt(angle)):.4f}° and {1e3 * sqrt(offset):.3f} mm"
+    )
+    if error["truth_name"] is not None:
+        line += (
+            f"; {error['angle_error_deg']:.4f}° and {1e3 * abs(error['offset_error_m']):.3f} mm "
+            f"from {error['truth_name']!r}"
+        )
+    return line
+
+
+def _point(point: list[float]) -> str:
+    return "(" + ", ".join(f"{value:.4f}" for value in point) + ") m"

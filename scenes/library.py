@@ -1,0 +1,193 @@
+"""The library of scenarios, and scenarios from files, with overrides by dotted path."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from scenes.scenario import Scenario, ScenarioError, parse_scenario
+from scenes.scenario_error import did_you_mean, shown
+from scenes.toml_writer import toml_text
+
+LARGEST_FILE = 10 * 2**20
+"""Largest scenario file that is read [byte]."""
+
+_BEGIN = {"objects": "kind", "users": "position_m"}  # what a new table cannot do without
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Name the scenarios of the library, in alphabetical order."""
+    entries = (entry.name for entry in _folder().iterdir())
+    return tuple(sorted(n.removesuffix(".toml") for n in entries if n.endswith(".toml")))
+
+
+def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Load a scenario of the library, or from a TOML file.
+
+    Parameters
+    ----------
+    name_or_path
+        A name of :func:`scenario_names`, or the path of a TOML file (anything that ends in
+        ``.toml``, holds a separator, or is a file). In a file, ``name`` may be missing; it is
+        then the file's own name.
+    overrides
+        ``"dotted.key=VALUE"``, applied in turn before anything is checked. VALUE is a TOML
+        literal, else a string. A missing table is made (``objects.post.kind=cylinder`` begins
+        a new object); what the scenario does not know is refused as in a file.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, the file cannot be read, or the scenario is impossible;
+        each line names file, key, value, limit and remedy.
+    """
+    source: Traversable
+    if name_or_path in scenario_names():
+        source, folder = _folder() / f"{name_or_path}.toml", None
+    elif _is_path(name_or_path):
+        source = Path(name_or_path)
+        folder = source.parent
+    else:
+        raise ScenarioError(
+            f"scenario {name_or_path!r}: no such name{did_you_mean(name_or_path, scenario_names())}"
+            f"; known: {', '.join(scenario_names())}; or give the path of a TOML file"
+        )
+    data = _tables(source, name_or_path)
+    data.setdefault("name", source.name.removesuffix(".toml"))
+    _override(data, overrides)
+    if folder is not None:
+        _resolve_mesh_files(data, folder)
+    try:
+        return parse_scenario(data)
+    except ScenarioError as error:
+        lines = [f"{name_or_path}: {line}" for line in str(error).splitlines()]
+        raise ScenarioError("\n".join(lines)) from None
+
+
+def override_scenario(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+    """Return a scenario with some keys changed, checked as in :func:`load_scenario`.
+
+    Raises
+    ------
+    ScenarioError
+        If an override cannot be read, or the result is impossible.
+    """
+    data = tomllib.loads(scenario_to_toml(scenario))
+    _override(data, overrides)
+    return parse_scenario(data)
+
+
+def scenario_to_toml(scenario: Scenario) -> str:
+    """Write a scenario as TOML, defaults included; loading it gives an equal scenario."""
+    return toml_text(_plain(scenario.model_dump(), flat=scenario.dimensions == 2))
+
+
+def scenario_schema() -> dict[str, Any]:
+    """Return the JSON schema of a scenario file, for editors and other programs."""
+    schema = Scenario.model_json_schema()
+    # JSON knows no infinity; a scenario without noise simply leaves the key out.
+    del schema["$defs"]["Noise"]["properties"]["snr_db"]["default"]
+    return schema
+
+
+def _folder() -> Traversable:
+    return files("scenes") / "library"
+
+
+def _is_path(text: str) -> bool:
+    return text.endswith(".toml") or "/" in text or "\\" in text or Path(text).is_file()
+
+
+def _tables(source: Traversable, shown_name: str) -> dict[str, Any]:
+    try:
+        if isinstance(source, Path) and source.stat().st_size > LARGEST_FILE:
+            raise ScenarioError(
+                f"{shown_name}: {source.stat().st_size} bytes are more than a scenario's "
+                f"{LARGEST_FILE}; is it another file?"
+            )
+        text = source.read_bytes().decode()
+    except OSError as error:
+        raise ScenarioError(
+            f"{shown_name}: cannot be read ({error.strerror}); give the path of a TOML file, or "
+            f"one of {', '.join(scenario_names())}"
+        ) from None
+    except UnicodeDecodeError as error:
+        raise ScenarioError(
+            f"{shown_name}: not text in UTF-8 (byte {error.start}); is it a TOML file?"
+        ) from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{shown_name}: not valid TOML: {error}; correct it there") from None
+    except RecursionError:
+        raise ScenarioError(f"{shown_name}: nested too deeply; is it a scenario?") from None
+
+
+def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
+    known = {group: set(_group(data, group)) for group in _BEGIN}
+    for override in overrides:
+        _apply(override, data)
+    for group, needed in _BEGIN.items():
+        for name, table in _group(data, group).items():
+            if name not in known[group] and isinstance(table, dict) and needed not in table:
+                raise ScenarioError(
+                    f"--set {group}.{name}: no such name{did_you_mean(name, known[group])}; known: "
+                    f"{', '.join(sorted(known[group])) or 'none'}; to add one, set "
+                    f"{group}.{name}.{needed} as well"
+                )
+
+
+def _group(data: Mapping[str, Any], group: str) -> dict[str, Any]:
+    tables = data.get(group)
+    return tables if isinstance(tables, dict) else {}
+
+
+def _apply(override: str, data: dict[str, Any]) -> None:
+    key, separator, text = override.partition("=")
+    path = [part.strip() for part in key.split(".")]
+    if not separator or not all(path):
+        raise ScenarioError(
+            f"--set {override!r}: must be KEY=VALUE with a dotted KEY, such as "
+            "objects.wall.angle_deg=35"
+        )
+    table = data
+    for depth, part in enumerate(path[:-1]):
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            parent = ".".join(path[: depth + 1])
+            raise ScenarioError(
+                f"--set {override!r}: {parent} = {shown(table)} is a value, not a table; set "
+                f"{parent} itself"
+            )
+    table[path[-1]] = _literal(text.strip())
+
+
+def _literal(text: str) -> object:
+    """Read a TOML literal; what is none is a string."""
+    try:
+        values = tomllib.loads(f"value = {text}")
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return text
+    return values["value"] if list(values) == ["value"] else text
+
+
+def _resolve_mesh_files(data: dict[str, Any], folder: Path) -> None:
+    """Make the mesh files' paths relative to the scenario's file absolute."""
+    for body in _group(data, "objects").values():
+        if isinstance(body, dict) and isinstance(body.get("file"), str) and body["file"]:
+            body["file"] = str((folder / body["file"]).resolve())
+
+
+def _plain(table: Mapping[str, Any], *, flat: bool) -> dict[str, object]:
+    """Leave out what is not given and, in 2-D, the z = 0 of positions."""
+    plain: dict[str, object] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            plain[key] = _plain(value, flat=flat)
+        elif flat and isinstance(value, tuple) and len(value) == 3:
+            plain[key] = value[:2]
+        elif value is not None:
+            plain[key] = value
+    return plain

@@ -1,0 +1,270 @@
+"""Scenarios: what a scene is made of, typed and checked; the truth that only we know.
+
+Keys carry their units (GHz, mm, m, degree, dB); the properties are SI and radians.
+"""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from scenes.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
+from scenes.base_station import BaseStation
+from scenes.directions import unit_vector
+from scenes.facet_spacing import facet_problems, facet_spacing
+from scenes.objects import MATERIALS, Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
+from scenes.placement import inconsistencies
+from scenes.quantities import Checked, Name, Position
+from scenes.radio import Radio
+from scenes.scenario_error import ScenarioError, did_you_mean, problems
+
+__all__ = [
+    "MATERIALS",
+    "Antenna",
+    "BaseStation",
+    "Box",
+    "Cosine",
+    "Cylinder",
+    "Directive",
+    "GaussianBeam",
+    "Horn",
+    "Isotropic",
+    "MeshFile",
+    "Noise",
+    "Plate",
+    "Radio",
+    "Roughness",
+    "Scenario",
+    "ScenarioError",
+    "SceneObject",
+    "User",
+    "parse_scenario",
+]
+
+MOST_SAMPLES = 2**30
+"""Most samples of an echo or an uplink: 16 GiB of complex doubles."""
+
+
+class User(Checked):
+    """A user that sends a pilot."""
+
+    position_m: Position = Field(description="the position of the user [m]")
+    antenna: Antenna = Field(default_factory=Isotropic, description="the user's antenna")
+
+    @model_validator(mode="after")
+    def _a_directive_antenna_looks_somewhere(self) -> "User":
+        if isinstance(self.antenna, Directive) and not self.antenna.aims:
+            raise PydanticCustomError(
+                "aims",
+                "a directive antenna must look somewhere; give antenna.aim (the name of an "
+                "object), antenna.aim_m (a point) or antenna.aim_deg (an azimuth)",
+            )
+        return self
+
+    @property
+    def position(self) -> Float[np.ndarray, " 3"]:
+        """Where the user is [m]."""
+        return np.array(self.position_m, dtype=np.float64)
+
+
+class Noise(Checked):
+    """Thermal noise: SNR of each channel sample, on the mean over the array."""
+
+    snr_db: float = Field(
+        float("inf"), ge=-60, allow_inf_nan=True, description="the signal-to-noise ratio [dB]"
+    )
+
+
+class Scenario(Checked):
+    """A whole scene: radio, base station, objects, users and noise. The truth."""
+
+    format: Literal[1] = Field(1, description="the format of this file: 1")
+    name: Name = Field(description="the scenario's name")
+    title: str = Field("", max_length=200, description="what it shows, in a line")
+    dimensions: Literal[2, 3] = Field(2, description="2 (invariant along z) or 3")
+    waves: Literal["spherical", "cylindrical"] = Field(
+        "spherical", description="'spherical', or 'cylindrical' (2-D full wave)"
+    )
+    max_bounces: int = Field(3, ge=0, le=8, description="the longest chain of mirrors")
+    radio: Radio = Field(description="the table [radio]")
+    base_station: BaseStation = Field(description="the table [base_station]")
+    objects: dict[Name, SceneObject] = Field(default_factory=dict, description="objects by name")
+    users: dict[Name, User] = Field(default_factory=dict, description="users by name")
+    noise: Noise = Field(default_factory=Noise, description="the table [noise]")
+
+    @model_validator(mode="after")
+    def _possible(self) -> "Scenario":
+        # In this order: each step relies on what those before have found sound.
+        found = _dimension_problems(self) + _sample_problems(self)
+        found = found or _mesh_problems(self)
+        found = found or [
+            *_aim_problems(self),
+            *facet_problems(self.objects, self.radio.shortest_wavelength),
+            *inconsistencies(
+                self.objects,
+                array=self.base_station.element_positions.reshape(*self.base_station.shape, 3),
+                users={name: user.position for name, user in self.users.items()},
+                clearance=self.radio.longest_wavelength,
+            ),
+        ]
+        if found:
+            raise PydanticCustomError("inconsistent", "inconsistent", {"problems": found})
+        return self
+
+    def facet_spacing(self, name: str) -> float:
+        """Return the largest facet spacing that an object needs; see :mod:`scenes.facet_spacing`.
+
+        Infinity for an absorber: it scatters nothing. [m]
+        """
+        return facet_spacing(self.objects[name], self.radio.shortest_wavelength)
+
+    def aim(self, antenna: Antenna, position: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+        """Return the unit vector in which an antenna at that position looks.
+
+        An antenna without an aim (isotropic, or the base station's) looks along the base
+        station's boresight.
+
+        Raises
+        ------
+        ScenarioError
+            If the aim is where the antenna stands.
+        """
+        if not isinstance(antenna, Directive) or not antenna.aims:
+            return self.base_station.boresight
+        if antenna.aim_deg is not None:
+            return unit_vector(antenna.aim_deg)
+        if antenna.aim is not None:
+            target = self.object_centre(antenna.aim)
+        else:
+            target = np.asarray(antenna.aim_m, dtype=np.float64)
+        offset = target - position
+        distance = float(np.linalg.norm(offset))
+        if distance == 0.0:
+            raise ScenarioError(
+                f"aim {target.tolist()} m is where the antenna stands; aim it at another point"
+            )
+        direction: np.ndarray = offset / distance
+        return direction
+
+    def object_centre(self, name: str) -> Float[np.ndarray, " 3"]:
+        """Return the centre of an object; of a mesh, that of its bounding box [m]."""
+        body = self.objects[name]
+        if isinstance(body, MeshFile):
+            from scenes.mesh_file import placed_mesh
+
+            low, high = np.asarray(placed_mesh(body).bounds, dtype=np.float64)
+            return np.array((low + high) / 2)
+        return body.centre
+
+
+def parse_scenario(data: Mapping[str, object]) -> Scenario:
+    """Read a scenario from nested tables, as a TOML file holds them.
+
+    Parameters
+    ----------
+    data
+        The tables; see :class:`Scenario`.
+
+    Raises
+    ------
+    ScenarioError
+        If something is missing, unknown or impossible: a line for each problem.
+    """
+    try:
+        return Scenario.model_validate(dict(data))
+    except ValidationError as error:
+        raise ScenarioError("\n".join(problems(error, Scenario))) from None
+
+
+def _dimension_problems(scenario: Scenario) -> list[str]:
+    found = []
+    flat = scenario.dimensions == 2
+    if scenario.waves == "cylindrical" and not flat:
+        found.append(
+            "waves = 'cylindrical': possible in two dimensions only, and dimensions = 3; "
+            "set waves = 'spherical'"
+        )
+    points = {"base_station.position_m": scenario.base_station.position_m}
+    for name, body in scenario.objects.items():
+        points[f"objects.{name}.centre_m"] = body.centre_m
+        if isinstance(body, MeshFile):
+            if flat:
+                found.append(
+                    f"objects.{name}.kind = 'mesh': possible in three dimensions only; "
+                    "set dimensions = 3, or use plates, cylinders and boxes"
+                )
+        elif flat and body.height_m is not None:
+            found.append(
+                f"objects.{name}.height_m = {body.height_m}: a 2-D scene is invariant along z; "
+                "remove it, or set dimensions = 3"
+            )
+        elif not flat and body.height_m is None:
+            found.append(f"objects.{name}.height_m: missing; give the height along z [m]")
+    if flat and isinstance(scenario.base_station.elements, tuple):
+        found.append(
+            f"base_station.elements = {list(scenario.base_station.elements)}: a planar array "
+            "needs dimensions = 3; give one number of elements"
+        )
+    stations: dict[str, BaseStation | User] = {"base_station": scenario.base_station}
+    stations |= {f"users.{name}": user for name, user in scenario.users.items()}
+    for key, station in stations.items():
+        points[f"{key}.position_m"] = station.position_m
+        if isinstance(station.antenna, Directive) and station.antenna.aim_m is not None:
+            points[f"{key}.antenna.aim_m"] = station.antenna.aim_m
+    if flat:
+        found += [
+            f"{key} = {list(point)}: z must be 0 in two dimensions; leave z out, "
+            "or set dimensions = 3"
+            for key, point in points.items()
+            if point[2] != 0
+        ]
+    return found
+
+
+def _mesh_problems(scenario: Scenario) -> list[str]:
+    found = []
+    for name, body in scenario.objects.items():
+        if isinstance(body, MeshFile):
+            from scenes.mesh_file import placed_mesh  # trimesh takes a second to import
+
+            try:
+                placed_mesh(body)
+            except ScenarioError as error:
+                found.append(f"objects.{name}.file: {error}")
+    return found
+
+
+def _aim_problems(scenario: Scenario) -> list[str]:
+    found = []
+    stations: dict[str, BaseStation | User] = {"base_station": scenario.base_station}
+    stations |= {f"users.{name}": user for name, user in scenario.users.items()}
+    for key, station in stations.items():
+        antenna = station.antenna
+        if not isinstance(antenna, Directive):
+            continue
+        if antenna.aim is not None and antenna.aim not in scenario.objects:
+            known = ", ".join(scenario.objects) or "none"
+            found.append(
+                f"{key}.antenna.aim = {antenna.aim!r}: no such object"
+                f"{did_you_mean(antenna.aim, scenario.objects)}; known: {known}"
+            )
+            continue
+        try:
+            scenario.aim(antenna, np.array(station.position_m, dtype=np.float64))
+        except ScenarioError as error:
+            found.append(f"{key}.antenna: {error}")
+    return found
+
+
+def _sample_problems(scenario: Scenario) -> list[str]:
+    samples = scenario.base_station.element_count * scenario.radio.points
+    if samples <= MOST_SAMPLES:
+        return []
+    return [
+        f"radio.points = {scenario.radio.points}: {scenario.base_station.element_count} elements "
+        f"times that are {samples:.3g} samples, more than {MOST_SAMPLES:.3g}; reduce radio.points "
+        "or base_station.elements"
+    ]

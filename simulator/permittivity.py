@@ -1,0 +1,213 @@
+r"""Complex relative permittivity over frequency: constant, after ITU-R P.2040-4, or tabulated.
+
+The permittivity is :math:`\varepsilon = \varepsilon' - j \varepsilon''` with the time convention
+exp(+jωt), so losses have :math:`\varepsilon'' > 0`.
+"""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import epsilon_0
+
+
+class MaterialError(ValueError):
+    """A material cannot be used; the message names it, the value, the limit and the remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantPermittivity:
+    """The same permittivity at all frequencies."""
+
+    value: complex  # ε' - jε'' [-]
+
+    def __post_init__(self) -> None:
+        """Refuse a permittivity below that of vacuum, or one with gain."""
+        _check_permittivity("the constant permittivity", np.array([self.value], dtype=complex))
+
+    def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Return the constant, once for each frequency."""
+        return np.full(frequencies.shape, self.value, dtype=np.complex128)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerLawPermittivity:
+    r"""The model of ITU-R P.2040-4, section 2.1.4, with b = 0: constant ε', conductivity c·f^d.
+
+    The frequency f is in GHz, and :math:`\varepsilon'' = \sigma / (2 \pi f \varepsilon_0)`.
+    """
+
+    name: str
+    real: float  # ε' [-]
+    factor: float  # c [S/m]
+    exponent: float  # d [-]
+    lowest: float  # [Hz]
+    highest: float  # [Hz]
+
+    def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Evaluate the power law, within the band it was fitted to."""
+        _check_band(
+            f"the ITU-R P.2040-4 row of {self.name!r}", frequencies, self.lowest, self.highest
+        )
+        conductivity = self.factor * (frequencies / 1e9) ** self.exponent
+        return self.real - 1j * conductivity / (2.0 * np.pi * frequencies * epsilon_0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TabulatedPermittivity:
+    """Measured permittivity, linear in frequency between the entries of a table."""
+
+    name: str
+    frequencies: Float[np.ndarray, " entries"]  # increasing [Hz]
+    values: Complex[np.ndarray, " entries"]  # ε' - jε'' [-]
+
+    def __post_init__(self) -> None:
+        """Refuse a table that is no function of frequency or no passive material."""
+        rising = np.all(np.diff(self.frequencies) > 0) and np.all(self.frequencies > 0)
+        if self.frequencies.size < 2 or not rising:
+            raise MaterialError(
+                f"{self.name}: {self.frequencies.size} frequencies; a table needs at least two, "
+                "positive and increasing: sort the rows and keep one of each"
+            )
+        _check_permittivity(self.name, self.values)
+
+    def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Interpolate the table, within the band it covers."""
+        _check_band(self.name, frequencies, float(self.frequencies[0]), float(self.frequencies[-1]))
+        values: np.ndarray = np.interp(frequencies, self.frequencies, self.values)
+        return values
+
+
+Permittivity = ConstantPermittivity | PowerLawPermittivity | TabulatedPermittivity
+"""Complex relative permittivity as a function of frequency."""
+
+
+ITU_ROWS: Mapping[str, tuple[tuple[float, float, float, float, float], ...]] = {
+    "concrete": ((1, 100, 5.24, 0.0462, 0.7822), (110, 330, 5.17, 0.0145, 1.0900)),
+    "brick": ((1, 40, 3.91, 0.0238, 0.16), (110, 330, 4.15, 0.0006, 1.5712)),
+    "plasterboard": (
+        (1, 100, 2.73, 0.0085, 0.9395),
+        (110, 330, 2.56, 0.0001, 1.7799),
+        (100, 400, 2.65, 0.0002, 1.598),
+    ),
+    "wood": (
+        (0.001, 100, 1.99, 0.0047, 1.0718),
+        (110, 330, 1.82, 0.0040, 1.0761),
+        (100, 400, 2.1183, 0.0055, 1.1113),
+    ),
+    "glass": (
+        (0.1, 100, 6.31, 0.0036, 1.3394),
+        (220, 450, 5.79, 0.0004, 1.658),
+        (100, 400, 6.5767, 0.0012, 1.4697),
+    ),
+    "ceiling_board": (
+        (1, 100, 1.48, 0.0011, 1.0750),
+        (220, 450, 1.52, 0.0029, 1.029),
+        (100, 400, 1.2567, 0.00013, 1.454),
+    ),
+    "chipboard": ((1, 100, 2.58, 0.0217, 0.7800), (100, 200, 2.16, 0.0023, 1.359)),
+    "plywood": ((1, 40, 2.71, 0.33, 0.0), (110, 330, 1.94, 0.0067, 0.9982)),
+    "marble": ((1, 60, 7.074, 0.0055, 0.9262), (110, 330, 7.94, 0.0001, 1.7330)),
+    "floorboard": ((50, 100, 3.66, 0.0044, 1.3515), (100, 400, 3.1575, 0.001675, 1.32775)),
+}
+"""Rows of Table 3 of ITU-R P.2040-4: lowest and highest frequency [GHz], ε', c, d. Where two
+cover a band the first counts."""
+
+
+def itu_permittivity(name: str, frequencies: Float[np.ndarray, " freqs"]) -> PowerLawPermittivity:
+    """Pick the row of ITU-R P.2040-4 that covers the whole band.
+
+    Raises
+    ------
+    MaterialError
+        If there is no such material, or no row for the band.
+    """
+    if name not in ITU_ROWS:
+        raise MaterialError(f"unknown ITU material {name!r}; known: {', '.join(ITU_ROWS)}")
+    low, high = frequencies.min() / 1e9, frequencies.max() / 1e9
+    for lowest, highest, real, factor, exponent in ITU_ROWS[name]:
+        if lowest <= low and high <= highest:
+            return PowerLawPermittivity(
+                name=name,
+                real=real,
+                factor=factor,
+                exponent=exponent,
+                lowest=lowest * 1e9,
+                highest=highest * 1e9,
+            )
+    rows = ", ".join(f"{row[0]:g}-{row[1]:g}" for row in ITU_ROWS[name])
+    raise MaterialError(
+        f"material {name!r}: no row of ITU-R P.2040-4 covers {low:g}-{high:g} GHz (rows: {rows} "
+        "GHz); give the permittivity itself, or a table"
+    )
+
+
+def read_permittivity(path: Path) -> TabulatedPermittivity:
+    """Read a table with the columns ``frequency_ghz,eps_real,eps_imag`` (ε'' positive: loss).
+
+    Raises
+    ------
+    MaterialError
+        If the file, a column or a number cannot be read.
+    """
+    columns = ("frequency_ghz", "eps_real", "eps_imag")
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file, skipinitialspace=True)
+            missing = [name for name in columns if name not in (reader.fieldnames or ())]
+            if missing:
+                raise MaterialError(
+                    f"{path}: the first line lacks {', '.join(missing)}; "
+                    f"it must be {','.join(columns)}"
+                )
+            rows = []
+            for row in reader:
+                try:
+                    rows.append([float(row[name]) for name in columns])
+                except (TypeError, ValueError):
+                    raise MaterialError(
+                        f"{path}, line {reader.line_num}: not three numbers; write "
+                        f"{','.join(columns)} in each line"
+                    ) from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise MaterialError(f"{path}: cannot be read as a CSV table ({error})") from error
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return TabulatedPermittivity(
+        name=str(path), frequencies=table[:, 0] * 1e9, values=table[:, 1] - 1j * table[:, 2]
+    )
+
+
+def conductivity(
+    permittivity: Complex[np.ndarray, " freqs"], frequencies: Float[np.ndarray, " freqs"]
+) -> Float[np.ndarray, " freqs"]:
+    r"""Return the conductivity in S/m, :math:`2 \pi f \varepsilon_0 \varepsilon''`.
+
+    With the real part it is what a radio material of Sionna RT is made of.
+    """
+    sigma: np.ndarray = -2.0 * np.pi * frequencies * epsilon_0 * permittivity.imag
+    return sigma
+
+
+def _check_permittivity(name: str, values: Complex[np.ndarray, " entries"]) -> None:
+    wrong = ~(np.isfinite(values) & (values.real >= 1.0) & (values.imag <= 0.0))
+    if np.any(wrong):
+        value = values[np.argmax(wrong)]
+        raise MaterialError(
+            f"{name}: {value.real:g} - {-value.imag:g}j is no permittivity of a passive "
+            "dielectric; the real part must be at least 1 and the loss at least 0"
+        )
+
+
+def _check_band(
+    name: str, frequencies: Float[np.ndarray, " freqs"], lowest: float, highest: float
+) -> None:
+    # One part in 1e9 forgives the rounding of GHz to Hz.
+    if frequencies.min() < lowest * (1 - 1e-9) or frequencies.max() > highest * (1 + 1e-9):
+        raise MaterialError(
+            f"{name} covers {lowest / 1e9:g}-{highest / 1e9:g} GHz, but the radio uses "
+            f"{frequencies.min() / 1e9:g}-{frequencies.max() / 1e9:g} GHz; "
+            "narrow the band or give a wider table"
+        )

@@ -1,0 +1,241 @@
+import errno
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from mmslam import output
+from mmslam.output import OutputError, refuse_foreign_results, refuse_foreign_store, replacing
+
+OURS = json.dumps({"format": 1, "users": [], "mirrors": [], "versions": {}})
+
+
+def fill(folder: Path, mark: str = "new") -> None:
+    folder.mkdir()
+    (folder / output.RESULT).write_text(OURS)
+    (folder / output.REPORT).write_text(mark)
+
+
+def everything_below(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def test_a_new_folder_appears_whole_and_nothing_stays_beside_it(tmp_path: Path) -> None:
+    with replacing(tmp_path / "a" / "b", refuse_foreign_results) as new:
+        fill(new)
+        assert not (tmp_path / "a" / "b").exists()
+    assert everything_below(tmp_path) == ["a", "a/b", "a/b/report.html", "a/b/result.json"]
+
+
+def test_the_new_folder_has_the_rights_that_the_umask_asks_for(tmp_path: Path) -> None:
+    with replacing(tmp_path / "out", refuse_foreign_results) as new:
+        fill(new)
+    (tmp_path / "plain").mkdir()
+    assert (tmp_path / "out").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_our_own_results_are_replaced(tmp_path: Path) -> None:
+    fill(tmp_path / "out", "old")
+    with replacing(tmp_path / "out", refuse_foreign_results) as new:
+        fill(new)
+        assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert (tmp_path / "out" / output.REPORT).read_text() == "new"
+    assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_a_failure_leaves_everything_as_it_was(tmp_path: Path, error: type[BaseException]) -> None:
+    fill(tmp_path / "out", "old")
+    with (  # noqa: PT012, what fails is the block
+        pytest.raises(error),
+        replacing(tmp_path / "out", refuse_foreign_results) as new,
+    ):
+        fill(new)
+        raise error
+    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    with (  # noqa: PT012
+        pytest.raises(error),
+        replacing(tmp_path / "x" / "y", refuse_foreign_results) as new,
+    ):
+        fill(new)
+        raise error
+    assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
+
+
+def test_an_interruption_between_the_two_renames_puts_the_old_folder_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(tmp_path / "out", "old")
+    rename = Path.rename
+
+    def interrupted(self: Path, target: Path) -> Path:
+        if self.name == "new":
+            raise KeyboardInterrupt
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", interrupted)
+    with (
+        pytest.raises(KeyboardInterrupt),
+        replacing(tmp_path / "out", refuse_foreign_results) as new,
+    ):
+        fill(new)
+    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
+
+
+def test_a_foreign_folder_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter1.tex").write_text("years of work")
+    with (
+        pytest.raises(OutputError, match="no earlier run of mmslam"),
+        replacing(tmp_path / "thesis", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+    assert (tmp_path / "thesis" / "chapter1.tex").read_text() == "years of work"
+
+
+def test_what_the_user_put_beside_our_results_is_not_deleted(tmp_path: Path) -> None:
+    fill(tmp_path / "out")
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    with (
+        pytest.raises(OutputError, match=r"notes\.txt"),
+        replacing(tmp_path / "out", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"format": 1}', '{"format": 2, "users": []}'])
+def test_a_foreign_result_file_does_not_make_a_folder_ours(tmp_path: Path, content: str) -> None:
+    (tmp_path / output.RESULT).write_text(content)
+    assert refuse_foreign_results(tmp_path) is not None
+
+
+def test_an_empty_folder_may_be_filled(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with replacing(tmp_path / "out", refuse_foreign_results) as new:
+        fill(new)
+    assert (tmp_path / "out" / output.RESULT).exists()
+
+
+def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("")
+    with (
+        pytest.raises(OutputError, match="it is a file"),
+        replacing(tmp_path / "out", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+
+
+def test_a_file_among_the_parents_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with (
+        pytest.raises(OutputError, match="no folder"),
+        replacing(tmp_path / "file" / "out", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+
+
+def test_the_current_folder_is_not_exchanged_under_the_shells_feet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with (
+        pytest.raises(OutputError, match="current folder"),
+        replacing(Path("."), refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+
+
+def test_a_link_is_followed_and_kept(tmp_path: Path) -> None:
+    fill(tmp_path / "real", "old")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    with replacing(tmp_path / "link", refuse_foreign_results) as new:
+        fill(new)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real" / output.REPORT).read_text() == "new"
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES])
+def test_a_place_that_cannot_be_written_is_found_out_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    def refused(**_: object) -> str:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refused)
+    with (
+        pytest.raises(OutputError, match="cannot write"),
+        replacing(tmp_path / "a" / "out", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+    assert everything_below(tmp_path) == []
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    # A limit on the size of a file fails as a full disk does: in the middle of a write.
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        with (  # noqa: PT012
+            pytest.raises(OutputError, match="size limit"),
+            replacing(tmp_path / "out", refuse_foreign_results) as new,
+        ):
+            new.mkdir()
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+            (new / "big").write_bytes(bytes(8192))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, kept)
+    assert everything_below(tmp_path) == []
+
+
+def test_another_os_error_keeps_its_traceback(tmp_path: Path) -> None:
+    with (
+        pytest.raises(FileNotFoundError),
+        replacing(tmp_path / "out", refuse_foreign_results) as new,
+    ):
+        (new / "no" / "such").read_text()
+
+
+def test_only_a_measurement_store_is_replaced_by_a_measurement(tmp_path: Path) -> None:
+    store = tmp_path / "m.zarr"
+    store.mkdir()
+    assert refuse_foreign_store(store) is None
+    (store / "zarr.json").write_text(json.dumps({"node_type": "group", "attributes": {}}))
+    assert refuse_foreign_store(store) is not None
+    (store / "zarr.json").write_text(json.dumps({"attributes": {"mmslam_format": 1}}))
+    assert refuse_foreign_store(store) is None
+
+
+def test_ctrl_c_in_the_middle_of_a_write_leaves_nothing_half_written(tmp_path: Path) -> None:
+    program = textwrap.dedent("""
+        import sys, time
+        from pathlib import Path
+        from mmslam.failures import told_clearly
+        from mmslam.output import refuse_foreign_results, replacing
+        with told_clearly(), replacing(Path(sys.argv[1]), refuse_foreign_results) as new:
+            new.mkdir()
+            (new / "result.json").write_text("{")
+            print("writing", flush=True)
+            time.sleep(60)
+    """)
+    child = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "a" / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=Path(__file__).resolve().parents[2],
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "writing\n"
+    child.send_signal(signal.SIGINT)
+    _, errors = child.communicate(timeout=30)
+    assert "nothing was written" in errors
+    assert everything_below(tmp_path) == []

@@ -1,0 +1,288 @@
+"""Our specular chains against Sionna RT's deterministic path solver, on random 3-D scenes.
+
+The two share the positions and the materials' constants, nothing else: ours are images in
+double precision with an analytic occlusion test, theirs are candidates from launched rays,
+single precision, Mitsuba's intersections.
+"""
+
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy.constants import epsilon_0, speed_of_light
+from scipy.spatial.transform import Rotation
+
+from estimator import engine
+from simulator.materials import Conductor, Dielectric, Material
+from simulator.mirrors import Mirrors
+from simulator.permittivity import ConstantPermittivity
+from simulator.specular_field import reflected_field
+from simulator.specular_paths import find_chains
+
+mi.set_variant(engine.mitsuba_variant())
+
+import sionna.rt as rt  # noqa: E402  the variant has to be chosen first
+
+FREQUENCY = 275e9  # [Hz]
+EDGE = 1e-4
+"""Hits and legs closer than this to an edge may be decided either way: the issue's limit. [m]"""
+
+SHORTEST_LEG = 1e-2
+"""The path solver drops paths with a leg below its MIN_SEGMENT_LENGTH. [m]"""
+
+RAYS = 300_000
+"""Rays that the path solver launches to find candidates."""
+
+SCENES = 60
+
+
+@dataclass(frozen=True)
+class Scene:
+    objects: list[np.ndarray]  # faces, corners, axes [m]
+    constants: list[tuple[complex, float]]  # permittivity and thickness of each object
+    points: np.ndarray  # one source, then receivers
+
+    @property
+    def corners(self) -> np.ndarray:
+        return np.concatenate(self.objects)
+
+
+@dataclass(frozen=True)
+class Path:
+    length: float  # [m]
+    amplitude: complex  # without the delay's phase
+    points: np.ndarray  # source, hits, receiver
+
+
+Paths = dict[tuple[int, tuple[int, ...]], Path]  # by receiver and sequence of faces
+
+
+def plate_or_box(rng: np.random.Generator, upright: bool) -> np.ndarray:
+    box = rng.random() < 0.3
+    half = rng.uniform(0.05, 0.15, 3) if box else np.array([*rng.uniform(0.12, 0.38, 2), 0.0])
+    faces = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            face = np.empty((4, 3))
+            face[:, axis] = side
+            face[:, (axis + 1) % 3] = side * np.array([-1, 1, 1, -1])
+            face[:, (axis + 2) % 3] = [-1, -1, 1, 1]
+            faces.append(face * half)
+    quadrilaterals = np.array(faces if box else faces[-1:])
+    if upright:  # as the walls of most scenes; a plate stands on its edge
+        stand = np.eye(3) if box else Rotation.from_euler("x", 90, degrees=True).as_matrix()
+        turn = Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix() @ stand
+    else:
+        turn = Rotation.random(rng=rng).as_matrix()
+    moved: np.ndarray = quadrilaterals @ turn.T + rng.uniform(-0.5, 0.5, 3)
+    return moved
+
+
+def crossings(corners: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Which segments (first axis) cross which rectangles (second axis)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    normals = np.cross(first, second)
+    before = np.einsum("smx,mx->sm", starts[:, None] - corners[:, 0], normals)
+    after = np.einsum("smx,mx->sm", ends[:, None] - corners[:, 0], normals)
+    crosses: np.ndarray = before * after < 0
+    share = np.divide(before, before - after, out=np.zeros_like(before), where=crosses)
+    hits = starts[:, None] + share[..., None] * (ends - starts)[:, None] - corners[:, 0]
+    for side in (first, second):
+        along = np.einsum("smx,mx->sm", hits, side) / np.einsum("mx,mx->m", side, side)
+        crosses &= (along >= 0) & (along <= 1)
+    return crosses
+
+
+def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return faces.reshape(-1, 3), np.roll(faces, -1, axis=1).reshape(-1, 3)
+
+
+def holds(faces: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a box holds a point."""
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 3] - faces[:, 0])
+    return len(faces) > 1 and bool(np.all(np.sum(normals * (point - faces[:, 0]), axis=1) < 0))
+
+
+def random_scene(seed: int) -> Scene:
+    """Six to nine plates and boxes in a cubic metre that do not cut each other."""
+    rng = np.random.default_rng(seed)
+    objects: list[np.ndarray] = []
+    count = rng.integers(6, 10)
+    while len(objects) < count:
+        new = plate_or_box(rng, upright=seed % 3 == 0)
+        if not any(
+            crossings(new, *edges(old)).any()
+            or crossings(old, *edges(new)).any()
+            or holds(old, new[0, 0])
+            or holds(new, old[0, 0])
+            for old in objects
+        ):
+            objects.append(new)
+    points: list[np.ndarray] = []
+    while len(points) < 9:
+        point = rng.uniform(-0.5, 0.5, 3)
+        if not any(holds(faces, point) for faces in objects):
+            points.append(point)
+    constants = [
+        (1.0 - 1e9j, 0.1)  # as good as a conductor
+        if rng.random() < 0.3
+        else (complex(rng.uniform(1.5, 6.0), -rng.uniform(0.0, 0.3)), rng.uniform(1e-3, 2e-2))
+        for _ in objects
+    ]
+    return Scene(objects, constants, np.array(points))
+
+
+def our_paths(scene: Scene) -> Paths:
+    surfaces: list[Material] = []
+    for (permittivity, thickness), faces in zip(scene.constants, scene.objects, strict=True):
+        perfect = permittivity.imag < -1e6
+        slab = Dielectric(
+            permittivity=ConstantPermittivity(value=permittivity), thickness=thickness
+        )
+        surfaces += [Conductor() if perfect else slab] * len(faces)
+    sides = [len(faces) == 1 for faces in scene.objects for _ in faces]
+    mirrors = Mirrors(
+        corners=scene.corners,
+        materials=tuple(surfaces),
+        rms_heights=np.zeros(len(surfaces)),
+        two_sided=np.array(sides),
+    )
+    source, receivers = scene.points[:1], scene.points[1:]
+
+    def blocked(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        met: np.ndarray = np.any(crossings(scene.corners, starts, ends), axis=1)
+        return met
+
+    found = {}
+    for chain in find_chains(mirrors, source, receivers, blocked=blocked):
+        field = reflected_field(mirrors, chain, np.array([FREQUENCY]))[:, 0]
+        spread = speed_of_light / FREQUENCY / (4 * np.pi * chain.lengths)
+        for index, receiver in enumerate(np.nonzero(chain.valid)[1].tolist()):
+            points = np.array([source[0], *chain.vertices[index], receivers[receiver]])
+            found[receiver, chain.mirrors] = Path(
+                float(chain.lengths[index]), complex(field[index] * spread[index]), points
+            )
+    return found
+
+
+def sionna_paths(scene: Scene) -> Paths:
+    theirs = rt.Scene()
+    theirs.frequency = FREQUENCY
+    theirs.tx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+    theirs.rx_array = theirs.tx_array
+    bodies = []
+    for index, (faces, (permittivity, thickness)) in enumerate(
+        zip(scene.objects, scene.constants, strict=True)
+    ):
+        first = 4 * np.arange(len(faces))[:, None, None]
+        triangles = first + np.array([[0, 1, 2], [0, 2, 3]])
+        mesh = mi.Mesh(f"object-{index}", 4 * len(faces), 2 * len(faces))
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = mi.Float(faces.ravel().astype(np.float32))
+        parameters["faces"] = mi.UInt32(triangles.ravel().astype(np.uint32))
+        parameters.update()
+        material = rt.RadioMaterial(
+            f"material-{index}",
+            relative_permittivity=permittivity.real,
+            conductivity=-permittivity.imag * 2 * np.pi * FREQUENCY * epsilon_0,
+            thickness=thickness,
+        )
+        bodies.append(rt.SceneObject(mi_mesh=mesh, name=f"object-{index}", radio_material=material))
+    theirs.edit(add=bodies)
+    theirs.add(rt.Transmitter("source", position=scene.points[0].tolist()))
+    for index, point in enumerate(scene.points[1:]):
+        theirs.add(rt.Receiver(f"receiver-{index}", position=point.tolist()))
+    paths = rt.PathSolver(deterministic=True)(
+        theirs,
+        max_depth=3,
+        samples_per_src=RAYS,
+        los=True,
+        specular_reflection=True,
+        diffuse_reflection=False,
+        refraction=False,
+        synthetic_array=False,
+        seed=1,
+    )
+    first_face = dict(
+        zip(
+            [body.object_id for body in bodies],
+            np.cumsum([0, *map(len, scene.objects[:-1])]).tolist(),
+            strict=True,
+        )
+    )
+    # Receiver and path; the two antennas and the source are single.
+    valid, delays = (field.numpy()[:, 0, 0, 0] for field in (paths.valid, paths.tau))
+    amplitudes = (paths.a[0].numpy() + 1j * paths.a[1].numpy())[:, 0, 0, 0]
+    kinds, shapes, triangles, vertices = (
+        field.numpy()[:, :, 0, 0, 0]
+        for field in (paths.interactions, paths.objects, paths.primitives, paths.vertices)
+    )
+    found = {}
+    for receiver, index in zip(*np.nonzero(valid), strict=True):
+        depth = int(np.count_nonzero(kinds[:, receiver, index]))
+        sequence = tuple(
+            first_face[int(shapes[bounce, receiver, index])]
+            + int(triangles[bounce, receiver, index]) // 2
+            for bounce in range(depth)
+        )
+        hits = vertices[:depth, receiver, index].astype(float)
+        key = (int(receiver), sequence)
+        assert key not in found
+        found[key] = Path(
+            float(delays[receiver, index]) * speed_of_light,
+            complex(amplitudes[receiver, index]),
+            np.array([scene.points[0], *hits, scene.points[1 + receiver]]),
+        )
+    return found
+
+
+def distance_from_edges(path: Path, corners: np.ndarray) -> float:
+    """Shortest distance between any leg of a path and any edge of the scene. [m]"""
+    starts, ends = edges(corners)
+    nearest = np.inf
+    for here, there in zip(path.points[:-1], path.points[1:], strict=True):
+        leg, side, gap = there - here, ends - starts, starts - here
+        # Closest points of two segments: stationary point, clipped to one, then to the other.
+        a, b, c = leg @ leg, side @ leg, np.sum(side**2, axis=1)
+        d, e = gap @ leg, np.sum(gap * side, axis=1)
+        determinant = np.maximum(a * c - b**2, 1e-30)
+        on_leg = np.clip((d * c - b * e) / determinant, 0, 1)
+        on_side = np.clip((b * on_leg - e) / c, 0, 1)
+        on_leg = np.clip((d + b * on_side) / a, 0, 1)
+        apart = gap + on_side[:, None] * side - on_leg[:, None] * leg
+        nearest = min(nearest, float(np.linalg.norm(apart, axis=1).min()))
+    return nearest
+
+
+def shortest_leg(path: Path) -> float:
+    return float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).min())
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [seed if seed < 12 else pytest.param(seed, marks=pytest.mark.slow) for seed in range(SCENES)],
+)
+def test_chains_delays_and_coefficients_are_those_of_the_path_solver(seed: int) -> None:
+    scene = random_scene(seed)
+    ours, theirs = our_paths(scene), sionna_paths(scene)
+    for key in ours.keys() ^ theirs.keys():
+        path = ours[key] if key in ours else theirs[key]
+        undecided = distance_from_edges(path, scene.corners) < EDGE
+        too_short = key in ours and shortest_leg(path) < SHORTEST_LEG
+        assert undecided or too_short, f"{key} is found by only one of the two"
+    both = ours.keys() & theirs.keys()
+    assert both
+    for key in both:
+        assert ours[key].length == pytest.approx(theirs[key].length, abs=1e-6), key
+        error = abs(ours[key].amplitude - theirs[key].amplitude)
+        assert error < 0.01 * abs(ours[key].amplitude), key
+
+
+def test_the_random_scenes_have_paths_of_every_number_of_bounces() -> None:
+    counts = np.zeros(4, dtype=int)
+    for seed in range(12):
+        counts += np.bincount(
+            [len(sequence) for _, sequence in our_paths(random_scene(seed))], minlength=4
+        )
+    assert np.all(counts >= 5), counts

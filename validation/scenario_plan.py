@@ -1,0 +1,153 @@
+"""The plan of a scenario: what is simulated, drawn before anything is computed."""
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+
+from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn
+from scenes.objects import Box, Cylinder, MeshFile, Plate
+from scenes.scenario import Scenario
+from validation import figures
+
+MATERIAL_COLOURS = {"absorber": "#3d3d3d", "metal": figures.MIRROR}
+_BEAM = 0.25  # length of the wedge that shows where an antenna looks, over the view's size
+
+
+def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
+    """Draw a scenario from above: array, objects, users and where their antennas look.
+
+    Parameters
+    ----------
+    ax
+        Is given equal axes in metres.
+    scenario
+        What is drawn, projected along z.
+    """
+    station = scenario.base_station
+    outlines = {name: outline(scenario, name) for name in scenario.objects}
+    users = {name: user.position for name, user in scenario.users.items()}
+    points = [station.element_positions, *outlines.values()]
+    points += [place[None] for place in users.values()]
+    view = figures.view_around(np.concatenate(points))
+    size = max(view.right - view.left, view.top - view.bottom)
+    ax.grid(color="#dfe4e8", lw=0.6)
+    ax.set_axisbelow(True)
+    ahead = station.boresight * 0.06 * size
+    ax.annotate(
+        "",
+        (station.position_m[0] + ahead[0], station.position_m[1] + ahead[1]),
+        xytext=station.position_m[:2],
+        arrowprops={"arrowstyle": "-|>", "color": figures.ARRAY},
+    )
+    for name, line in outlines.items():
+        _draw_object(ax, scenario, name, line)
+    figures.overlay_array(ax, station.element_positions)
+    beams = [(np.asarray(station.position_m), station.antenna, figures.ARRAY)]
+    beams += [(user.position, user.antenna, figures.USER) for user in scenario.users.values()]
+    for place, antenna, colour in beams:
+        _draw_beam(ax, place, scenario.aim(antenna, place), antenna, colour, _BEAM * size)
+    for name, place in users.items():
+        ax.plot(*place[:2], "o", color=figures.USER, mec="white", ms=8, mew=1.2, zorder=6)
+        ax.annotate(
+            name,
+            (float(place[0]), float(place[1])),
+            xytext=(0, 9),
+            textcoords="offset points",
+            ha="center",
+            color=figures.USER,
+            fontweight="bold",
+            fontsize=9,
+        )
+    ax.set(
+        xlim=(view.left, view.right),
+        ylim=(view.bottom, view.top),
+        aspect="equal",
+        xlabel="x, along the array [m]",
+        ylabel="y, boresight [m]",
+    )
+    return ax
+
+
+def outline(scenario: Scenario, name: str) -> Float[np.ndarray, "corners 3"]:
+    """Return the corners of an object seen from above [m]."""
+    body = scenario.objects[name]
+    if isinstance(body, MeshFile):
+        from scenes.mesh_file import placed_mesh
+
+        low, high = np.asarray(placed_mesh(body).bounds, dtype=np.float64)
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        return np.array([[x, y, low[2]] for x, y in corners])
+    if isinstance(body, Plate):
+        half = body.length_m / 2 * body.tangent
+        return np.stack([body.centre - half, body.centre + half])
+    if isinstance(body, Cylinder):
+        along, across = body.radius_m * body.tangent, body.radius_m * body.across
+    else:
+        along, across = body.length_m / 2 * body.tangent, body.depth_m / 2 * body.across
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return np.stack([body.centre + u * along + v * across for u, v in signs])
+
+
+def _draw_object(
+    ax: Axes, scenario: Scenario, name: str, line: Float[np.ndarray, "corners 3"]
+) -> None:
+    body = scenario.objects[name]
+    colour = MATERIAL_COLOURS.get(body.material, figures.PATH)
+    if isinstance(body, Plate):
+        ax.plot(line[:, 0], line[:, 1], color=colour, lw=3.5, solid_capstyle="butt", zorder=3)
+    elif isinstance(body, Cylinder):
+        ax.add_patch(Circle((body.centre_m[0], body.centre_m[1]), body.radius_m, color=colour))
+    else:
+        style = "--" if isinstance(body, MeshFile) else "-"  # of a mesh, the bounding box
+        ax.add_patch(Polygon(line[:, :2], fc="none", ec=colour, lw=2, ls=style))
+    rough = f", {body.roughness.rms_mm:g} mm rms" if body.roughness else ""
+    centre = line.mean(axis=0)
+    ax.annotate(
+        f"{name} ({body.material}{rough})",
+        (float(centre[0]), float(centre[1])),
+        xytext=(0, 8),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        rotation=_readable(body.angle_deg) if isinstance(body, Plate | Box) else 0.0,
+        rotation_mode="anchor",
+        color=colour,
+        fontsize=8,
+    )
+
+
+def _draw_beam(
+    ax: Axes,
+    place: Float[np.ndarray, " 3"],
+    aim: Float[np.ndarray, " 3"],
+    antenna: Antenna,
+    colour: str,
+    reach: float,
+) -> None:
+    width = half_power_width(antenna)
+    if width is None:
+        return
+    azimuth = float(np.arctan2(aim[1], aim[0]))
+    angles = np.linspace(azimuth - width / 2, azimuth + width / 2, 33)
+    edge = place[:2] + reach * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    ax.add_patch(Polygon(np.vstack([place[:2], edge]), color=colour, alpha=0.18, lw=0))
+
+
+def half_power_width(antenna: Antenna) -> float | None:
+    """Return the angle between an antenna's half-power directions, None if isotropic [rad].
+
+    The simulator's patterns in closed form: a plan needs neither the simulator nor LLVM.
+    """
+    if isinstance(antenna, GaussianBeam):
+        return float(2 * antenna.sigma_rad * np.sqrt(np.log(2)))
+    if isinstance(antenna, Cosine):
+        return float(2 * np.arccos(0.5 ** (1 / antenna.exponent))) if antenna.exponent else None
+    if isinstance(antenna, Horn):
+        return float(np.pi * 10 ** (-antenna.gain_dbi / 20))
+    return None
+
+
+def _readable(angle_deg: float) -> float:
+    """Turn a text's angle so that it never stands on its head [degree]."""
+    return (angle_deg + 90.0) % 180.0 - 90.0
