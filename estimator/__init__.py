@@ -1,4 +1,4 @@
-"""From a measurement to a map and a position; it never sees the scene.
+r"""From a measurement to a map and a position; it never sees the scene.
 
 Glossary: the thesis' symbol, our name, unit.
 
@@ -9,7 +9,7 @@ symbol             name                    unit
 :math:`k`          ``wavenumber``          rad/m
 :math:`q_m`        ``positions``           m
 :math:`s_{mn}`     ``samples``             1
-:math:`\\theta`     ``aoa``                 rad
+:math:`\theta`      ``aoa``                 rad
 :math:`R`          ``path_length``         m
 :math:`r_m`        ``distance``            m
 :math:`D`          ``aperture_length``     m

@@ -10,9 +10,7 @@ from estimator.backprojection import focus_uplink
 from estimator.estimate import AngleRangeMap
 from estimator.measurement import MeasurementError, Uplink
 from estimator.range_profiles import unambiguous_path
-
-HALF_POWER = 0.886
-"""-3 dB width of sin(πx)/(πx): the cell of an untapered aperture or band. [-]"""
+from estimator.resolution import HALF_POWER
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 Y_AXIS = np.array([0.0, 1.0, 0.0])

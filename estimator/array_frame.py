@@ -21,13 +21,14 @@ class ArrayFrame:
     axes: Float[np.ndarray, "3 3"]  # rows: the array's x, y, z in the world
 
     def to_local(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """Express points of the world in the array's frame. [m]"""
+        """Express points of the world in the array's frame. [m]."""
         local: np.ndarray = (points - self.origin) @ self.axes.T
         return local
 
     def to_world(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """Express points of the array's frame in the world. [m]"""
-        return self.turned_to_world(points) + self.origin
+        """Express points of the array's frame in the world. [m]."""
+        world: np.ndarray = self.turned_to_world(points) + self.origin
+        return world
 
     def turned_to_world(self, vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Turn vectors of the array's frame into the world's axes."""
@@ -58,7 +59,7 @@ def array_frame(
             "aperture_position: one position has no aperture; angle needs at least two"
         )
     origin = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
-    _, extents, directions = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)
+    _, _, directions = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)
     across = float(np.linalg.norm((positions - origin) @ directions[1:].T, axis=-1).max())
     if across > STRAIGHTNESS:
         raise MeasurementError(

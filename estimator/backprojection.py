@@ -5,12 +5,14 @@ relative to the array's centre, where :math:`r_m - R = (q^2 - 2 p \cdot q) / (r_
 cancellation, and what is common to all channels is applied once per point in float64.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from jaxtyping import Complex, Float
+from numpy.polynomial import Chebyshev, Polynomial
 from scipy.constants import speed_of_light
 
 from estimator import engine
@@ -18,7 +20,22 @@ from estimator.measurement import Echo, MeasurementError, Uplink
 from estimator.range_profiles import RangeProfiles, range_profiles
 
 POINTS_PER_LANE = 4
-"""Points that share each load of an antenna position; 4 was fastest on AVX-512. [-]"""
+"""Points that share each load of an antenna position; 4 was fastest on AVX-512. [-]."""
+
+_GUARD = 2  # cells repeated past the unambiguous range, for lengths that round up to it
+
+FLAT = 1e-10
+"""Extent below which an array does not span an axis: a phase of 1e-6 at 300 GHz. [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """One end of the paths, in coordinates that the array spans: one if it is linear."""
+
+    ends: Float[np.ndarray, "channels 3"]  # in the world frame [m]
+    centre: Float[np.ndarray, " 3"]  # their mean [m]
+    axes: Float[np.ndarray, "spanned 3"]  # unit vectors
+    coordinates: tuple[Any, ...]  # Float: the ends along each axis, from the centre [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +43,8 @@ class Focuser:
     """Range profiles that lie in the memory of the device that focuses them."""
 
     profiles: RangeProfiles
-    table: Any  # Float: two packets of four for each channel and cell
-    antennas: tuple[Any, ...]  # Float, one per leg: (-2q, |q|²) for each channel
-    centres: tuple[Float[np.ndarray, " 3"], ...]  # the origin of each leg's q [m]
+    table: Any  # UInt64: a complex coefficient in each, four for each channel and cell
+    legs: tuple["Leg", ...]
 
 
 def backproject(
@@ -122,20 +138,24 @@ def prepare(profiles: RangeProfiles) -> Focuser:
         If they are too many for the device's 32-bit addresses.
     """
     arrays = engine.arrays()
-    coefficients = profiles.coefficients
-    if coefficients.size * 2 >= 2**32:
+    channels, cells, order = profiles.coefficients.shape
+    if channels * (cells + _GUARD) * order >= 2**32:
         raise MeasurementError(
-            f"{coefficients.shape[0]} positions x {coefficients.shape[1]} range cells are more "
-            "than 32-bit addresses reach; image the positions in parts and add the images"
+            f"{channels} positions x {cells} range cells are more than 32-bit addresses reach; "
+            "image the positions in parts and add the images"
         )
-    centres = tuple(leg.mean(axis=0) for leg in profiles.legs)
-    antennas = tuple(
-        _own(arrays.Float(_antenna_table(leg - centre)))
-        for leg, centre in zip(profiles.legs, centres, strict=True)
-    )
-    flat = np.ascontiguousarray(coefficients).view(np.float32).ravel()
-    table = _own(arrays.Float(flat))
-    return Focuser(profiles, table, antennas, centres)
+    # A path length that is rounded up to the unambiguous one reads the first cells again.
+    source = arrays.UInt64(np.ascontiguousarray(profiles.coefficients).view(np.uint64).ravel())
+    width = dr.opaque(arrays.UInt32, (cells + _GUARD) * order)
+    entry = dr.arange(arrays.UInt32, channels * (cells + _GUARD) * order)
+    row = entry // width
+    column = entry - row * width
+    period = dr.opaque(arrays.UInt32, cells * order)
+    column = dr.select(column < period, column, column - period)
+    table = dr.gather(arrays.UInt64, source, row * period + column)
+    legs = tuple(_leg(arrays, ends) for ends in profiles.legs)
+    dr.eval(table)
+    return Focuser(profiles, table, legs)
 
 
 def focus(
@@ -164,24 +184,21 @@ def focus(
     shape = points.shape[:-1]
     if not points.size:
         return np.zeros(shape, dtype=np.complex128)
-    order = _axes_by_range(points, focuser.centres[-1])
+    order = _axes_by_range(points, focuser.legs[-1].centre)
     ordered = np.moveaxis(points, order, range(len(order)))
-    flat = np.ascontiguousarray(ordered.reshape(-1, 3), dtype=np.float64)
-    _refuse_points_out_of_range(focuser, flat)
-    image = _focus(focuser, flat, amplitude_ratio).reshape(ordered.shape[:-1])
+    columns = np.moveaxis(ordered, -1, 0).reshape(3, -1).astype(np.float64)
+    _refuse_points_out_of_range(focuser, columns)
+    image = _focus(focuser, columns, amplitude_ratio).reshape(ordered.shape[:-1])
     return np.moveaxis(image, range(len(order)), order).copy()
 
 
-def _own(mapped: Any) -> Any:
-    """Copy an array into Dr.Jit's memory: it loads no packets from memory that NumPy aligned."""
-    copy = mapped + dr.opaque(type(mapped), 0.0)
-    dr.eval(copy)
-    return copy
-
-
-def _antenna_table(positions: Float[np.ndarray, "channels 3"]) -> Float[np.ndarray, " values"]:
-    squares = (positions**2).sum(axis=1, keepdims=True)
-    return np.hstack([-2 * positions, squares]).astype(np.float32).ravel()
+def _leg(arrays: Any, ends: Float[np.ndarray, "channels 3"]) -> Leg:
+    centre = ends.mean(axis=0)
+    directions = np.linalg.svd(ends - centre, full_matrices=False)[2]
+    along = (ends - centre) @ directions.T
+    spanned = np.abs(along).max(axis=0) > FLAT
+    coordinates = [arrays.Float(column.astype(np.float32)) for column in along[:, spanned].T]
+    return Leg(ends, centre, directions[spanned], tuple(coordinates))
 
 
 def _axes_by_range(
@@ -201,20 +218,19 @@ def _axes_by_range(
     return tuple(int(axis) for axis in np.argsort(changes, kind="stable")[::-1])
 
 
-def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "points 3"]) -> None:
+def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 points"]) -> None:
+    low, high = points.min(axis=1), points.max(axis=1)  # NaN if any is
+    if not np.all(np.isfinite([low, high])):
+        bad = int(np.count_nonzero(~np.isfinite(points).all(axis=0)))
+        raise MeasurementError(
+            f"{bad} of {points.shape[1]} pixels have NaN or infinite coordinates"
+        )
     profiles = focuser.profiles
-    bad = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
-    if bad:
-        raise MeasurementError(f"{bad} of {len(points)} pixels have NaN or infinite coordinates")
-    reach = np.zeros(len(points))  # upper bound of each point's longest path
-    for leg, centre in zip(profiles.legs, focuser.centres, strict=True):
-        size = np.linalg.norm(leg - centre, axis=1).max()
-        reach += profiles.passes * (_norm(points - centre) + size)
-    doubtful = points[reach > profiles.unambiguous]
-    longest = 0.0
-    for legs in zip(*profiles.legs, strict=True) if len(doubtful) else ():
-        path = profiles.passes * sum((_norm(doubtful - end) for end in legs), np.zeros(1))
-        longest = max(longest, float(path.max()))
+    corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1)
+    # A length is convex: over the box around the points it is largest at a corner.
+    if _longest_path(profiles, corners) <= profiles.unambiguous:
+        return
+    longest = _longest_path(profiles, points)
     if longest > profiles.unambiguous:
         ways = profiles.passes * len(profiles.legs)
         raise MeasurementError(
@@ -224,47 +240,47 @@ def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "poi
         )
 
 
-def _norm(vectors: Float[np.ndarray, "points 3"]) -> Float[np.ndarray, " points"]:
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
+def _longest_path(profiles: RangeProfiles, points: Float[np.ndarray, "3 points"]) -> float:
+    longest = 0.0
+    for channel in zip(*profiles.legs, strict=True):
+        path = sum(np.linalg.norm(points - end[:, None], axis=0) for end in channel)
+        longest = max(longest, profiles.passes * float(np.max(path)))
+    return longest
 
 
 def _focus(
-    focuser: Focuser, points: Float[np.ndarray, "points 3"], amplitude_ratio: bool
+    focuser: Focuser, columns: Float[np.ndarray, "3 points"], amplitude_ratio: bool
 ) -> Complex[np.ndarray, " points"]:
     """Run the kernel: one lane for every few points, one loop over the channels.
 
     Everything that varies from call to call enters as an array or an opaque value, so that
-    Dr.Jit compiles once for each number of legs and kind of weighting.
+    Dr.Jit compiles once for each kind of array and weighting.
     """
     arrays = engine.arrays()
     profiles = focuser.profiles
-    channels = len(profiles.coefficients)
-    count = len(points)
+    count = columns.shape[1]
     lanes = -(-count // POINTS_PER_LANE)
-    coordinates = [arrays.Float64(np.ascontiguousarray(points[:, i])) for i in range(3)]
+    coordinates = [arrays.Float64(column) for column in columns]
     last = dr.opaque(arrays.UInt32, count - 1)
     per_cell = dr.opaque(arrays.Float64, profiles.passes / profiles.cell)
-    turns_per_cell = profiles.carrier * profiles.cell / speed_of_light
-    turns = dr.opaque(arrays.Float64, turns_per_cell)
-    end = dr.opaque(arrays.Float64, channels)
+    turns = dr.opaque(arrays.Float64, profiles.carrier * profiles.cell / speed_of_light)
 
-    lane = arrays.UInt32(dr.arange(arrays.UInt32, lanes))
+    lane = dr.arange(arrays.UInt32, lanes)
     groups = []
     for i in range(POINTS_PER_LANE):
         index = dr.minimum(lane * POINTS_PER_LANE + i, last)
         point = [dr.gather(arrays.Float64, axis, index) for axis in coordinates]
-        groups.append(_point_state(arrays, point, focuser.centres, per_cell))
+        groups.append(_point_state(arrays, point, focuser.legs, per_cell))
     sums = _sum_over_channels(arrays, focuser, groups, per_cell, turns, amplitude_ratio)
 
     norm = dr.opaque(arrays.Float64, 1.0 / profiles.gain)
+    channels = dr.opaque(arrays.Float64, len(profiles.coefficients))
     results = []
     for group, (re, im, weight) in zip(groups, sums, strict=True):
         # The phase of the path to the centre, reduced to one turn in float64.
         turn = group["cells"] * turns
         sine, cosine = dr.sincos((turn - dr.round(turn)) * (2 * np.pi))
-        scale = norm
-        if amplitude_ratio:
-            scale = norm * end / arrays.Float64(weight)
+        scale = norm * channels / arrays.Float64(weight) if amplitude_ratio else norm
         re, im = arrays.Float64(re), arrays.Float64(im)
         results.append(((re * cosine - im * sine) * scale, (re * sine + im * cosine) * scale))
     dr.eval(results)  # together: one kernel
@@ -275,28 +291,32 @@ def _focus(
 
 
 def _point_state(
-    arrays: Any, point: list[Any], centres: tuple[Float[np.ndarray, " 3"], ...], per_cell: Any
+    arrays: Any, point: list[Any], legs: tuple[Leg, ...], per_cell: Any
 ) -> dict[str, Any]:
     """Work out in float64 what a point needs in the loop, and round it to float32."""
     cells = arrays.Float64(0)
-    legs = []
-    for centre in centres:
-        p = [x - dr.opaque(arrays.Float64, float(c)) for x, c in zip(point, centre, strict=True)]
+    states = []
+    for leg in legs:
+        p = [x - _opaque(arrays, c) for x, c in zip(point, leg.centre, strict=True)]
         square = dr.fma(p[0], p[0], dr.fma(p[1], p[1], p[2] * p[2]))
         distance = dr.sqrt(square)
         cells = cells + distance * per_cell
-        legs.append(tuple(arrays.Float(value) for value in (*p, distance, square)))
+        twice = [
+            2 * sum(_opaque(arrays, a) * x for a, x in zip(axis, p, strict=True))
+            for axis in leg.axes
+        ]
+        states.append(tuple(arrays.Float(value) for value in (distance, square, *twice)))
     whole = dr.round(cells)
     return {
-        "legs": legs,
+        "legs": states,
         "cells": cells,
         "cell": arrays.Int32(whole),
         "fraction": arrays.Float(cells - whole),
     }
 
 
-def _by_three(values: list[Any] | tuple[Any, ...]) -> list[tuple[Any, Any, Any]]:
-    return list(zip(values[0::3], values[1::3], values[2::3], strict=True))
+def _opaque(arrays: Any, value: float) -> Any:
+    return dr.opaque(arrays.Float64, float(value))
 
 
 def _sum_over_channels(
@@ -308,35 +328,43 @@ def _sum_over_channels(
     amplitude_ratio: bool,
 ) -> list[tuple[Any, Any, Any]]:
     """Add up all channels for each group of points, less the phase to the centre."""
-    channels, cells, _ = focuser.profiles.coefficients.shape
+    channels, cells, order = focuser.profiles.coefficients.shape
     end = dr.opaque(arrays.UInt32, channels)
-    stride = dr.opaque(arrays.UInt32, cells)
+    stride = dr.opaque(arrays.UInt32, cells + _GUARD)
     scale, turns = arrays.Float(per_cell), arrays.Float(turns)
     # A point on an antenna at the centre has 0/0 here; its path difference is 0 then.
     tiny = 1e-30
 
     def add_channel(channel: Any, row: Any, *sums: Any) -> tuple[Any, ...]:
-        ends = [dr.gather(arrays.Array4f, antennas, channel) for antennas in focuser.antennas]
+        ends = [
+            [dr.gather(arrays.Float, axis, channel) for axis in leg.coordinates]
+            for leg in focuser.legs
+        ]
         totals = []
         for group, (re, im, weight) in zip(groups, _by_three(sums), strict=True):
-            shift = arrays.Float(0)
-            for (x, y, z, distance, square), q in zip(group["legs"], ends, strict=True):
-                excess = dr.fma(x, q[0], dr.fma(y, q[1], dr.fma(z, q[2], q[3])))
+            shift, ratio = arrays.Float(0), arrays.Float(1)
+            for (distance, square, *twice), q in zip(group["legs"], ends, strict=True):
+                # |p - q|² - |p|², without cancellation of what q does not change
+                excess = sum((a * (a - two) for a, two in zip(q, twice, strict=True)), 0.0)
                 length = dr.sqrt(dr.maximum(square + excess, 0.0))
                 shift = shift + excess / (distance + length + tiny)
+                if amplitude_ratio:
+                    ratio = ratio * distance / dr.maximum(length, tiny)
             shift = shift * scale
             place = group["fraction"] + shift
             whole = dr.round(place)
             v = place - whole
-            packet = 2 * (row + arrays.UInt32(group["cell"] + arrays.Int32(whole)))
-            low = dr.gather(arrays.Array4f, focuser.table, packet)
-            high = dr.gather(arrays.Array4f, focuser.table, packet + 1)
-            profile_re = dr.fma(v, dr.fma(v, dr.fma(v, high[2], high[0]), low[2]), low[0])
-            profile_im = dr.fma(v, dr.fma(v, dr.fma(v, high[3], high[1]), low[3]), low[1])
+            entry = order * (row + arrays.UInt32(group["cell"] + arrays.Int32(whole)))
+            profile_re, profile_im = arrays.Float(0), arrays.Float(0)
+            for i in reversed(range(order)):
+                # Both parts in one load; a packet of all four would cost a call on the CPU.
+                pair = dr.gather(arrays.UInt64, focuser.table, entry + i)
+                low, high = arrays.UInt32(pair), arrays.UInt32(pair >> 32)
+                profile_re = dr.fma(profile_re, v, dr.reinterpret_array(arrays.Float, low))
+                profile_im = dr.fma(profile_im, v, dr.reinterpret_array(arrays.Float, high))
             turn = shift * turns
-            sine, cosine = dr.sincos((turn - dr.round(turn)) * (2 * np.pi))
+            sine, cosine = _sincos_of_turns(turn - dr.round(turn))
             if amplitude_ratio:
-                ratio = distance / dr.maximum(length, tiny)
                 sine, cosine, weight = sine * ratio, cosine * ratio, dr.fma(ratio, ratio, weight)
             re = dr.fma(profile_re, cosine, dr.fma(-profile_im, sine, re))
             im = dr.fma(profile_re, sine, dr.fma(profile_im, cosine, im))
@@ -348,3 +376,28 @@ def _sum_over_channels(
     start = (arrays.UInt32(0), arrays.UInt32(0), *zeros)
     _, _, *sums = dr.while_loop(start, lambda channel, *_: channel < end, add_channel)
     return _by_three(sums)
+
+
+def _half_turn_series(values: Callable[[np.ndarray], np.ndarray]) -> list[float]:
+    """Coefficients, highest first, of a function of the square of half turns in |t| ≤ ½."""
+    series = Chebyshev.interpolate(values, 3, domain=[0.0, 0.25])
+    return [float(value) for value in series.convert(kind=Polynomial).coef[::-1]]
+
+
+_SINE_SERIES = _half_turn_series(lambda square: np.pi * np.sinc(np.sqrt(square)))
+_COSINE_SERIES = _half_turn_series(lambda square: np.cos(np.pi * np.sqrt(square)))
+
+
+def _sincos_of_turns(turn: Any) -> tuple[Any, Any]:
+    """Sine and cosine of 2π·turn for |turn| ≤ ½, to 2e-5: half of Dr.Jit's own cost."""
+    square = turn * turn
+    sine, cosine = _SINE_SERIES[0], _COSINE_SERIES[0]
+    for a, b in zip(_SINE_SERIES[1:], _COSINE_SERIES[1:], strict=True):
+        sine, cosine = dr.fma(square, sine, a), dr.fma(square, cosine, b)
+    sine = sine * turn
+    double = sine + sine
+    return double * cosine, 1.0 - double * sine
+
+
+def _by_three(values: list[Any] | tuple[Any, ...]) -> list[tuple[Any, Any, Any]]:
+    return list(zip(values[0::3], values[1::3], values[2::3], strict=True))

@@ -53,9 +53,7 @@ def backend() -> str:
     prepare()
     import drjit as dr
 
-    present = [
-        name for name in BACKENDS if dr.has_backend(getattr(dr.JitBackend, name.upper()))
-    ]
+    present = [name for name in BACKENDS if dr.has_backend(getattr(dr.JitBackend, name.upper()))]
     chosen = asked or ("cuda" if "cuda" in present else "llvm")
     if chosen == "llvm":
         _check_llvm("llvm" in present)

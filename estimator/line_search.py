@@ -12,10 +12,10 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter
 
 FALSE_ALARM = 1e-6
-"""Probability that a pixel of pure background counts as significant. [-]"""
+"""Probability that a pixel of pure background counts as significant. [-]."""
 
 DYNAMIC_RANGE = 3e-5
-"""Intensity below the image's peak that may be a sidelobe of it (−45 dB). [-]"""
+"""Intensity below the image's peak that may be a sidelobe of it (−45 dB). [-]."""
 
 MOST_PEAKS = 400
 """Strongest peaks searched: the search is over all their pairs."""
@@ -39,11 +39,14 @@ class Resolution:
     def cell(
         self, points: Float[np.ndarray, "*n 3"], direction: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, "*n"]:
-        """Width of the resolution cell along a direction, for an array at the origin. [m]"""
+        """Width of the resolution cell along a direction, for an array at the origin. [m]."""
         reach = np.linalg.norm(points, axis=-1)
         radial = np.abs(points @ direction) / reach
         crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
-        return 1 / np.hypot(radial / self.along_ray, crossing / (self.across_ray * reach))
+        width: np.ndarray = 1 / np.hypot(
+            radial / self.along_ray, crossing / (self.across_ray * reach)
+        )
+        return width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +77,9 @@ def significant_peaks(
     """
     background = float(np.median(intensity)) / np.log(2)
     threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
-    rows, columns = np.nonzero((intensity == maximum_filter(intensity, size=3)) & (intensity > threshold))
+    rows, columns = np.nonzero(
+        (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
+    )
     order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
     return points[rows[order], columns[order]]
 
@@ -117,7 +122,9 @@ def _best_line(
     apart = length > 3 * cells  # closer pairs point nowhere
     first, along, length = first[apart], along[apart], length[apart]
     best: tuple[int, np.ndarray] | None = None
-    for pairs in np.array_split(np.arange(len(first)), max(1, len(first) * len(peaks) // 4_000_000)):
+    for pairs in np.array_split(
+        np.arange(len(first)), max(1, len(first) * len(peaks) // 4_000_000)
+    ):
         directions = along[pairs] / length[pairs, None]
         near = _near_lines(peaks, peaks[first[pairs]], directions, resolution)
         counts = near.sum(axis=1)
@@ -181,4 +188,5 @@ def _on_segment(
     places = (peaks - line.start) @ direction
     margin = 3 * resolution.cell(peaks, direction)
     beside = _near_lines(peaks, line.start[None], direction[None], resolution, tolerance)[0]
-    return beside & (places > -margin) & (places < length + margin)
+    members: np.ndarray = beside & (places > -margin) & (places < length + margin)
+    return members

@@ -14,15 +14,24 @@ from estimator.estimate import Estimate, Image, Mirror, Progress, UserEstimate
 from estimator.ghost_correction import corrected_image
 from estimator.measurement import Echo, Measurement, Uplink, frequency_step
 from estimator.mirror_fit import FittedLine
-from estimator.mirrors import detect_mirrors, echo_reach, echo_resolution, unaliased_sine
+from estimator.mirrors import (
+    Survey,
+    detect_mirrors,
+    echo_reach,
+    echo_resolution,
+    survey,
+    unaliased_sine,
+)
 from estimator.paths import find_paths
 from estimator.pixel_grid import PixelGrid
 from estimator.projection import Wall, crossing, mirrored
 from estimator.range_profiles import range_profiles
 from estimator.user_decision import decide
 
-PIXELS = 1_500_000
+PIXELS = 2_000_000
 """Most pixels of an image that is shown; its spacing grows beyond."""
+MARGIN = 0.05
+"""What an image shows around the outermost things in it. [m]."""
 
 MAP_SAMPLES = 1.5
 """Samples of the angle/range map for each -3 dB width: a peak between them loses 1.3 dB at
@@ -54,9 +63,8 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     if measurement.clock_offset is None:
         notes.append("the clock offset of the user is unknown and was taken to be 0")
     echo, uplinks = measurement.echo, _on_our_clock(measurement)
-    for part in (*([echo] if echo else []), *uplinks):
-        frequency_step(part.frequencies)  # refused before any work
-    positions = echo.positions if echo else uplinks[0].positions
+    frequency_step((echo or uplinks[0]).frequencies)  # refused before any work
+    positions = (echo or uplinks[0]).positions
     frame = array_frame(positions, measurement.boresight)
     steps = 2 + len(uplinks)
 
@@ -65,13 +73,14 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     raw = corrected = None
     walls: tuple[Wall, ...] = ()
     seen: tuple[tuple[int, ...], ...] = ()
-    local_echo = None
+    local_echo = looked_over = None
     if echo is None:
         notes.append("no echo was measured, so nothing is known of mirrors")
     else:
         started = time.perf_counter()
         local_echo = replace(echo, positions=frame.to_local(echo.positions))
-        lines = detect_mirrors(local_echo)
+        looked_over = survey(local_echo)
+        lines = detect_mirrors(local_echo, looked_over)
         lines, walls, seen = _folded(lines)
         timings["mirrors"] = time.perf_counter() - started
     tell("estimate", 1, steps)
@@ -98,10 +107,10 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         timings[f"user {uplink.user}"] = time.perf_counter() - started
         tell("estimate", 2 + index, steps)
 
-    if local_echo is not None:
+    if local_echo is not None and looked_over is not None:
         started = time.perf_counter()
         ends = [frame.to_local(user.path) for user in users if user.path is not None]
-        raw, corrected = _images(local_echo, frame, walls, seen, ends)
+        raw, corrected = _images(local_echo, looked_over, frame, walls, seen, ends)
         timings["images"] = time.perf_counter() - started
     tell("estimate", steps, steps)
     return Estimate(
@@ -141,6 +150,7 @@ def _folded(
     A line whose midpoint is hidden behind a mirror is a wall's ghost: mirroring it about that
     mirror gives its true place.
     """
+
     def hides(wall: FittedLine, line: FittedLine) -> bool:
         far = float(np.linalg.norm(line.middle))
         hit = crossing(np.zeros(3), line.middle / far, wall.start, wall.end)
@@ -167,10 +177,7 @@ def _wall(line: FittedLine) -> Wall:
     return Wall(start=line.start, end=line.end, covariance=line.covariance)
 
 
-def _mirror(
-    frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]
-) -> Mirror:
-    normal = np.array([line.direction[1], -line.direction[0], 0.0])
+def _mirror(frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]) -> Mirror:
     along = wall.end - wall.start
     normal = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
     middle = 0.5 * (wall.start + wall.end)
@@ -201,6 +208,7 @@ def _in_world(user: UserEstimate, frame: ArrayFrame) -> UserEstimate:
 
 def _images(
     echo: Echo,
+    looked_over: Survey,
     frame: ArrayFrame,
     walls: Sequence[Wall],
     seen: Sequence[tuple[int, ...]],
@@ -220,7 +228,9 @@ def _images(
         values[inside] = focus(focuser, points[inside])
         return values
 
-    grid = _grid(echo, frame, walls, paths, farthest, sine)
+    shown = [np.zeros((1, 3)), echo.positions, looked_over.peaks, *paths]
+    shown += [np.stack([wall.start, wall.end]) for wall in walls]
+    grid = _grid(frame.to_world(np.concatenate(shown)), echo_resolution(echo).along_ray)
     points = frame.to_local(grid.points)
     direct = [wall for wall, through in zip(walls, seen, strict=True) if not through]
     raw = focus_in_reach(points)
@@ -228,22 +238,10 @@ def _images(
     return Image(values=raw, grid=grid), Image(values=corrected, grid=grid)
 
 
-def _grid(
-    echo: Echo,
-    frame: ArrayFrame,
-    walls: Sequence[Wall],
-    paths: Sequence[Float[np.ndarray, "vertices 3"]],
-    farthest: float,
-    sine: float,
-) -> PixelGrid:
-    """Cover the sector that can be imaged, and what is folded out of it."""
-    corners = [np.array([x * sine * farthest, y * farthest, 0.0]) for x in (-1, 1) for y in (0, 1)]
-    folded = [vertex for path in paths for vertex in path]
-    ends = [end for wall in walls for end in (wall.start, wall.end)]
-    world = frame.to_world(np.array([*corners, *folded, *ends]))
-    low, high = world.min(axis=0) - 0.05, world.max(axis=0) + 0.05
-    spacing = 0.5 * echo_resolution(echo).along_ray
-    spacing *= max(1.0, float(np.sqrt(np.prod((high - low)[:2]) / spacing**2 / PIXELS)))
+def _grid(shown: Float[np.ndarray, "points 3"], cell: float) -> PixelGrid:
+    """Cover all points that are to be seen, with two pixels a range cell if affordable."""
+    low, high = shown.min(axis=0) - MARGIN, shown.max(axis=0) + MARGIN
+    spacing = max(0.5 * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
     return PixelGrid.spanning(
         x=(float(low[0]), float(high[0])), y=(float(low[1]), float(high[1])), spacing=spacing
     )

@@ -70,7 +70,7 @@ class Measurement:
 
 
 def frequency_step(frequencies: Float[np.ndarray, " freqs"]) -> float:
-    """Return the step of a uniform frequency grid. [Hz]
+    """Return the step of a uniform frequency grid. [Hz].
 
     Raises
     ------

@@ -53,12 +53,13 @@ class FittedLine:
 
     @property
     def middle(self) -> Float[np.ndarray, " 3"]:
-        """Midpoint. [m]"""
-        return 0.5 * (self.start + self.end)
+        """Midpoint. [m]."""
+        middle: np.ndarray = 0.5 * (self.start + self.end)
+        return middle
 
     @property
     def length(self) -> float:
-        """Length. [m]"""
+        """Length. [m]."""
         return float(np.linalg.norm(self.end - self.start))
 
     @property
@@ -141,12 +142,13 @@ def _cell_across(
 def _places(
     start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
 ) -> Float[np.ndarray, " places"]:
-    """Sample a segment without its very ends, measured from its midpoint. [m]"""
+    """Sample a segment without its very ends, measured from its midpoint. [m]."""
     length = float(np.linalg.norm(end - start))
     cell = _cell_along(start, end, resolution)
     length -= min(2 * CELLS_CUT * cell, 0.5 * length)
     count = max(2, round(SAMPLES_PER_CELL * length / cell))
-    return (np.arange(count) + 0.5) / count * length - length / 2
+    places: np.ndarray = (np.arange(count) + 0.5) / count * length - length / 2
+    return places
 
 
 def _trial_points(
@@ -163,11 +165,12 @@ def _trial_points(
     tangents = np.cos(tilts)[:, None] * along - np.sin(tilts)[:, None] * normal
     normals = np.cos(tilts)[:, None] * normal + np.sin(tilts)[:, None] * along
     middle = 0.5 * (start + end)
-    return (
+    points: np.ndarray = (
         middle
         + offsets[None, :, None, None] * normals[:, None, None, :]
         + places[None, None, :, None] * tangents[:, None, None, :]
     )
+    return points
 
 
 def _refined(

@@ -27,6 +27,7 @@ class Survey:
 
     values: Complex[np.ndarray, "ranges sines"]
     points: Float[np.ndarray, "ranges sines 3"]  # in the array's frame [m]
+    peaks: Float[np.ndarray, "peaks 3"]  # that stand out of the background, strongest first [m]
 
 
 def echo_resolution(echo: Echo) -> Resolution:
@@ -34,13 +35,11 @@ def echo_resolution(echo: Echo) -> Resolution:
     band = float(echo.frequencies[-1] - echo.frequencies[0])
     wavelength = speed_of_light / float(echo.frequencies.mean())
     aperture = float(np.ptp(echo.positions[:, 0]))
-    return Resolution(
-        along_ray=speed_of_light / (2 * band), across_ray=wavelength / (2 * aperture)
-    )
+    return Resolution(along_ray=speed_of_light / (2 * band), across_ray=wavelength / (2 * aperture))
 
 
 def echo_reach(echo: Echo) -> tuple[float, float]:
-    """Return the distances between which an echo can be imaged: the aperture, and c/2Δf. [m]"""
+    """Return the distances between which an echo can be imaged: the aperture, and c/2Δf. [m]."""
     aperture = float(np.ptp(echo.positions[:, 0]))
     farthest = speed_of_light / (2 * frequency_step(echo.frequencies)) - 1.1 * aperture
     return 0.5 * aperture, farthest
@@ -70,7 +69,8 @@ def survey(echo: Echo) -> Survey:
     points[..., 0] = ranges[:, None] * sines
     points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
     values = backproject(echo, points, weights=_taper_weights(echo))
-    return Survey(values=values, points=points)
+    peaks = significant_peaks(np.abs(values) ** 2, points)
+    return Survey(values=values, points=points, peaks=peaks)
 
 
 def _taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
@@ -82,27 +82,27 @@ def _taper(count: int) -> Float[np.ndarray, " count"]:
     return weights
 
 
-def detect_mirrors(echo: Echo) -> tuple[FittedLine, ...]:
+def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     """Find the walls that the image shows; the strongest first.
 
     Parameters
     ----------
     echo
         In the array's frame.
+    looked
+        Its survey.
 
     Returns
     -------
     Lines whose confidence is at least :data:`LEAST_CONFIDENCE`. Nothing tells here whether
     one is seen directly or through another.
     """
-    looked = survey(echo)
     resolution = echo_resolution(echo)
     # The taper widens the resolution by about 1.4.
     coarse = Resolution(
         along_ray=1.4 * resolution.along_ray, across_ray=1.4 * resolution.across_ray
     )
-    peaks = significant_peaks(np.abs(looked.values) ** 2, looked.points)
-    candidates = find_lines(peaks, coarse)
+    candidates = find_lines(looked.peaks, coarse)
     plain = prepare(range_profiles(echo))
     tapered = prepare(range_profiles(echo, weights=_taper_weights(echo)))
     reach = echo_reach(echo)

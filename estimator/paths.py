@@ -10,18 +10,19 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from estimator.angle_range_map import angle_range_map
+from estimator.curvature_search import search_curvature
 from estimator.estimate import AngleRangeMap
 from estimator.measurement import Uplink
 from estimator.spherical_wave_fit import SphericalWave, fit_spherical_wave, wave_field
 
 MOST_PATHS = 4
 LEAST_SHARE = 0.02
-"""Share of the pilot's energy below which a wave is not looked at. [-]"""
+"""Share of the pilot's energy below which a wave is not looked at. [-]."""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the robust covariance is an estimate
 from few blocks itself, and a rough mirror bends the wavefront in ways it only samples."""
 CURVATURE_SLACK = 0.1
-"""Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]"""
+"""Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ class Path:
 
     @property
     def unfolded(self) -> float | None:
-        """A path length beyond the unambiguous one that fits the curvature, if one does. [m]"""
+        """A path length beyond the unambiguous one that fits the curvature, if one does. [m]."""
         longer = [self.wave.path_length + turns * self.unambiguous for turns in (1, 2, 3)]
         return next((length for length in longer if self._agrees_with(length)), None)
 
@@ -75,17 +76,16 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
         aoa, length = float(this_map.aoa[row]), float(this_map.path_length[column])
         try:
             wave = fit_spherical_wave(left, aoa=aoa, path_length=length)
+            start = search_curvature(left, aoa=wave.aoa, path_length=wave.path_length)
             free = fit_spherical_wave(
-                left, aoa=wave.aoa, path_length=wave.path_length, free_curvature=True
+                left, aoa=start.aoa, path_length=start.path_length, radius=start.radius
             )
         except ValueError:
             break  # no maximum near the peak: a ridge, not a wave
         share = free.explained * float(np.sum(np.abs(left.samples) ** 2)) / energy
         if share < LEAST_SHARE:
             break
-        paths.append(
-            Path(wave=wave, free=free, share=share, unambiguous=speed_of_light / step)
-        )
+        paths.append(Path(wave=wave, free=free, share=share, unambiguous=speed_of_light / step))
         # With its own curvature, whatever it is, less of the wave is left behind.
         field = wave_field(
             left.positions,

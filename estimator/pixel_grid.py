@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 UNEVEN = 1e-6
-"""Largest departure of an axis from uniform steps, over the step. [-]"""
+"""Largest departure of an axis from uniform steps, over the step. [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 MOST_BOUNCES = 8
 GRAZING = 1e-9
-"""Least distance from one bounce to the next. [m]"""
+"""Least distance from one bounce to the next. [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,10 +45,11 @@ def mirrored(
     start: Float[np.ndarray, " 3"],
     end: Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, "*n 3"]:
-    """Mirror points about the line through two points of the array's plane. [m]"""
+    """Mirror points about the line through two points of the array's plane. [m]."""
     along = (end - start) / np.linalg.norm(end - start)
     normal = np.array([along[1], -along[0], 0.0])
-    return points - 2 * ((points - start) @ normal)[..., None] * normal
+    images: np.ndarray = points - 2 * ((points - start) @ normal)[..., None] * normal
+    return images
 
 
 def project(
@@ -77,9 +78,9 @@ def project(
     """
     path, met, margin = _trace(aoa, path_length, walls)
 
-    def moved_end(change: Callable[[Float[np.ndarray, " 2"]], tuple[float, float, list[Wall]]]) -> (
-        Float[np.ndarray, "3 2"]
-    ):
+    def moved_end(
+        change: Callable[[Float[np.ndarray, " 2"]], tuple[float, float, list[Wall]]],
+    ) -> Float[np.ndarray, "3 2"]:
         """Differentiate the end by two parameters; the chain of walls is kept."""
         columns = []
         for unit in np.eye(2) * 1e-6:
@@ -90,6 +91,7 @@ def project(
     by_path = moved_end(lambda x: (aoa + x[0], path_length + x[1], list(walls)))
     total = by_path @ covariance @ by_path.T
     for index in set(met):
+
         def move(x: Float[np.ndarray, " 2"], index: int = index) -> tuple[float, float, list[Wall]]:
             shifted = list(walls)
             shifted[index] = walls[index].moved(tilt=float(x[0]), offset=float(x[1]))

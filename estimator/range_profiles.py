@@ -26,7 +26,6 @@ UNEVEN_STEPS = 1e-3
 """Departure from a uniform frequency grid, over the step, from which on the profiles are
 summed as they are: at the far end of the unambiguous range it is a phase of 2π·1e-3. [-]"""
 
-_GUARD = 2  # cells repeated past the unambiguous range, for lengths that round up to it
 _ORDER = 4  # coefficients of a cubic
 
 
@@ -89,16 +88,16 @@ def range_profiles(
     offsets = (frequencies - carrier) / step  # whole numbers on a uniform grid
     span = int(np.ceil((frequencies[-1] - frequencies[0]) / step)) + 1
     cells = int(scipy.fft.next_fast_len(int(np.ceil(CELLS_PER_SAMPLE * span))))
-    cubic = tapered[:, :, None] * _cubic_of_a_phase(2 * np.pi * offsets / cells)
+    phase = 2 * np.pi * offsets / cells  # from one cell to the next
+    fit = _cubic_of_a_phase(phase)
     whole = np.rint(offsets).astype(np.int64)
     if np.abs(offsets - whole).max() <= UNEVEN_STEPS:
-        table = np.zeros((len(samples), cells + _GUARD, _ORDER), dtype=np.complex64)
         spectrum = np.zeros((len(samples), cells, _ORDER), dtype=np.complex64)
-        spectrum[:, whole % cells] = cubic
-        table[:, :cells] = scipy.fft.ifft(spectrum, axis=1, norm="forward", workers=-1)
-        table[:, cells:] = table[:, :_GUARD]
+        spectrum[:, whole] = tapered.astype(np.complex64)[:, :, None] * fit.astype(np.complex64)
+        table = scipy.fft.ifft(spectrum, axis=1, norm="forward", workers=-1, overwrite_x=True)
     else:
-        table = _nonuniform(cubic, 2 * np.pi * offsets / cells, cells + _GUARD)
+        # No period: two more cells, for lengths that round up to the unambiguous one.
+        table = _nonuniform(tapered[:, :, None] * fit, phase, cells + 2)
     two_way = isinstance(data, Echo) and data.transmit_positions is None
     legs: tuple[Float[np.ndarray, "channels 3"], ...] = (data.positions,)
     if isinstance(data, Echo) and data.transmit_positions is not None:

@@ -21,7 +21,7 @@ from estimator.measurement import Uplink
 
 ITERATIONS = 30
 CONVERGED = 1e-4
-"""Step at which the iteration ends, in standard deviations of the parameters. [-]"""
+"""Step at which the iteration ends, in standard deviations of the parameters. [-]."""
 
 BLOCKS = 16
 """Blocks of neighbouring elements whose residuals count as independent."""
@@ -47,7 +47,7 @@ def wave_field(
     path_length: float,
     radius: float,
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Evaluate the model's field at unit gain, for elements in the array's frame. [-]"""
+    """Evaluate the model's field at unit gain, for elements in the array's frame. [-]."""
     source = radius * np.array([np.cos(aoa), np.sin(aoa), 0.0])
     distances = np.linalg.norm(source - positions, axis=-1)
     lengths = distances - radius + path_length
@@ -59,7 +59,7 @@ def wave_field(
 
 
 def fit_spherical_wave(
-    uplink: Uplink, *, aoa: float, path_length: float, free_curvature: bool = False
+    uplink: Uplink, *, aoa: float, path_length: float, radius: float | None = None
 ) -> SphericalWave:
     """Refine a peak of the angle/range map, for elements in the array's frame.
 
@@ -69,8 +69,9 @@ def fit_spherical_wave(
         The pilot, with positions in the array's frame.
     aoa, path_length
         The peak on the grid, within its main lobe. [rad], [m]
-    free_curvature
-        Fit the radius of curvature as well, instead of taking it to be the path length.
+    radius
+        Start of a fit of the radius of curvature as well; ``None``: it is taken to be the
+        path length. [m]
 
     Returns
     -------
@@ -82,7 +83,7 @@ def fit_spherical_wave(
     ValueError
         If the iteration leaves the neighbourhood of the peak.
     """
-    parameters = np.array([aoa, path_length] + [path_length] * free_curvature)
+    parameters = np.array([aoa, path_length] + ([] if radius is None else [radius]))
     start = parameters.copy()
     wavenumbers = 2 * np.pi * uplink.frequencies / speed_of_light
     aperture = float(np.ptp(uplink.positions[:, 0]))
@@ -97,7 +98,7 @@ def fit_spherical_wave(
         step = np.linalg.solve(normal, scores.sum(axis=0))
         # Far from the peak the linear model overshoots: never move by more than half a lobe.
         limit = float(np.max(np.abs(step[2:4]) / (0.5 * lobe), initial=0.0))
-        if free_curvature:
+        if radius is not None:
             limit = max(limit, abs(step[4]) / (0.3 * parameters[2]))
         parameters = parameters + step[2:] / max(1.0, limit)
         if np.any(np.abs(parameters[:2] - start[:2]) > 2 * lobe):

@@ -38,7 +38,9 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
         variables["element_position"] = (("element", "axis"), first.positions, {"units": "m"})
         frequencies = first.frequencies
     # Variable-length strings: the fixed-length kind has no specification in Zarr v3.
-    labels = np.array([uplink.user for uplink in measurement.uplinks], dtype=np.dtypes.StringDType())
+    labels = np.array(
+        [uplink.user for uplink in measurement.uplinks], dtype=np.dtypes.StringDType()
+    )
     coordinates = {
         "frequency": ("frequency", frequencies, {"units": "Hz"}),
         "axis": ("axis", np.array(["x", "y", "z"], dtype=np.dtypes.StringDType())),
@@ -62,7 +64,9 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
     return dataset
 
 
-def write_measurement(path: Path, measurement: Measurement, *, truth: xr.Dataset | None = None) -> None:
+def write_measurement(
+    path: Path, measurement: Measurement, *, truth: xr.Dataset | None = None
+) -> None:
     """Write a measurement (and its truth) aside, then rename it into place.
 
     Parameters
@@ -227,7 +231,9 @@ def _array(
             f"{path}: {name!r} has dimensions {variable.dims}; they must be {dimensions}"
         )
     if variable.dtype.kind not in "iufc" or (kind is float and variable.dtype.kind == "c"):
-        raise MeasurementError(f"{path}: {name!r} has type {variable.dtype}; it must be {kind.__name__}")
+        raise MeasurementError(
+            f"{path}: {name!r} has type {variable.dtype}; it must be {kind.__name__}"
+        )
     if dimensions[-1] == "axis" and variable.sizes["axis"] != 3:
         raise MeasurementError(
             f"{path}: {name!r} has {variable.sizes['axis']} coordinates; it needs x, y and z"

@@ -12,9 +12,9 @@ from estimator.paths import Path
 from estimator.projection import Projection, Wall, project
 
 AGREE = float(chi2.ppf(0.999, df=2))
-"""Squared distance, over its covariance, within which two positions are the same. [-]"""
+"""Squared distance, over its covariance, within which two positions are the same. [-]."""
 RIVAL = 0.25
-"""Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]"""
+"""Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
 END_DEVIATIONS = 3.0
 
 
@@ -153,9 +153,7 @@ def _past_the_end(
     wave, met = hypothesis.path.wave, hypothesis.projection.walls
     deviation = END_DEVIATIONS * float(np.sqrt(wave.covariance[0, 0]))
     for turn in (cell + deviation, -cell - deviation):
-        turned = project(
-            wave.aoa + turn, wave.path_length, walls, covariance=wave.covariance
-        )
+        turned = project(wave.aoa + turn, wave.path_length, walls, covariance=wave.covariance)
         if turned.walls != met:
             chain = [walls[index] for index in turned.walls]
             place = project(wave.aoa, wave.path_length, _endless(chain), covariance=wave.covariance)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import typer
 
+from mmslam.interruption import interruptions_noted
+
 BAD_INPUT = 2
 INTERRUPTED = 130
 
@@ -14,16 +16,17 @@ INTERRUPTED = 130
 @contextlib.contextmanager
 def told_clearly() -> Iterator[None]:
     """Turn bad input into its message and exit code 2, Ctrl-C into exit code 130."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        _say("interrupted; nothing was written")
-        raise typer.Exit(INTERRUPTED) from None
-    except Exception as error:
-        if not isinstance(error, _users_errors()):
-            raise
-        _say(f"error: {error}")
-        raise typer.Exit(BAD_INPUT) from None
+    with interruptions_noted() as interrupted:
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            if interrupted() or isinstance(error, KeyboardInterrupt):
+                _say("interrupted; nothing was written")
+                raise typer.Exit(INTERRUPTED) from None
+            if not isinstance(error, _users_errors()):
+                raise
+            _say(f"error: {error}")
+            raise typer.Exit(BAD_INPUT) from None
 
 
 @contextlib.contextmanager

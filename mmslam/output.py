@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,6 +17,10 @@ REPORT = "report.html"
 FORMAT = 1
 
 FIGURES = ("raw_image.png", "corrected_image.png", "angle_range_map.png", "localization.png")
+
+_SETTLING = 0.05  # how long late writers are given after each removal [s]
+_ABSENCES = 4  # how often the folder must then be found absent
+_MOST_REMOVALS = 40
 
 # What a full disk, a quota, a size limit, a read-only place or a missing right report.
 _PLACE_ERRORS = {
@@ -29,6 +34,7 @@ _PLACE_ERRORS = {
     errno.EEXIST: "a part of the path is no folder",
     errno.ENAMETOOLONG: "the name is too long",
     errno.EBUSY: "it is in use",
+    errno.ENOTEMPTY: "another program is writing there",
 }
 
 
@@ -70,6 +76,7 @@ def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[P
         new = aside / "new"  # mkdtemp's own folder is closed to others, this one need not be
         yield new
         _exchange(new, target, aside / "old")
+        shutil.rmtree(aside, ignore_errors=True)
     except OSError as error:
         reason = _PLACE_ERRORS.get(error.errno or 0)
         if reason is None:
@@ -79,8 +86,8 @@ def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[P
             "place (nothing was left behind)"
         ) from error
     finally:
-        if aside is not None:
-            shutil.rmtree(aside, ignore_errors=True)
+        if aside is not None and aside.exists():
+            _remove(aside)
         for parent in missing:  # innermost first; stops at the first that is not empty
             with suppress(OSError):
                 parent.rmdir()
@@ -109,6 +116,18 @@ def refuse_foreign_store(folder: Path) -> str | None:
     if "mmslam_format" not in (root.get("attributes") or {}):
         return "it is not a measurement that mmslam wrote"
     return None
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder that threads may still write to: Zarr's go on after a failure."""
+    absent = 0
+    for _ in range(_MOST_REMOVALS):
+        if folder.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            absent = 0
+        elif (absent := absent + 1) == _ABSENCES:
+            return
+        time.sleep(_SETTLING)
 
 
 def _check_replaceable(target: Path, refusal: Callable[[Path], str | None]) -> None:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from estimator.estimate import Estimate, Image
 from estimator.measurement import Measurement
 from mmslam import output
-from validation import figures
+from validation import figures, views
 from validation.truth import Truth
 
 DOTS_PER_INCH = 150
@@ -69,19 +69,20 @@ def image_figure(
     *,
     corrected: bool,
 ) -> Figure:
-    """Draw a SAR image: raw with the mirrors over it, corrected with all that was found."""
-    shown = estimate if corrected else Estimate(users=(), mirrors=estimate.mirrors)
-    points = [figures.estimate_points(shown, positions), figures.bright_points(image)]
-    view = figures.view_around(np.concatenate(points))
+    """Draw a SAR image: raw with the mirrors marked, corrected with all that was found.
+
+    Both show the same part of the plane, to be looked at side by side.
+    """
+    images = [shown for shown in (estimate.raw_image, estimate.corrected_image) if shown]
+    bright = [views.bright_points(shown) for shown in images]
+    view = views.view_around(np.concatenate([views.estimate_points(estimate, positions), *bright]))
     figure = _figure(view, extra_width=1.1)
     ax = figures.draw_image(figure.subplots(), image, view=view)
-    figures.overlay_mirrors(ax, estimate.mirrors)
+    figures.overlay_mirrors(ax, estimate.mirrors, line=corrected)
     figures.overlay_array(ax, positions, colour=figures.ON_DARK)
     if corrected:
         figures.overlay_targets(ax, estimate.targets)
-        for user in estimate.users:
-            if user.path is not None:
-                ax.plot(user.path[:, 0], user.path[:, 1], color=figures.PATH, lw=1.2)
+        figures.overlay_paths(ax, estimate.users, width=1.2)
         figures.overlay_users(ax, estimate.users)
     ax.set_title(
         "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
@@ -90,13 +91,16 @@ def image_figure(
 
 
 def angle_range_figure(estimate: Estimate) -> Figure:
-    """Draw the angle/range map of every user, one beside the other."""
+    """Draw the angle/range map of every user, whole and enlarged about what was found."""
     users = {user.name: user for user in estimate.users}
-    count = len(estimate.maps)
-    figure = Figure(figsize=(1.2 + 5.8 * count, 5.2), layout="constrained")
-    for ax, heard in zip(np.atleast_1d(figure.subplots(1, count)).flat, estimate.maps, strict=True):
-        figures.draw_angle_range_map(ax, heard, users.get(heard.user))
-        ax.set_title(f"Uplink of {heard.user}")
+    figure = Figure(figsize=(11.5, 4.6 * len(estimate.maps)), layout="constrained")
+    axes = figure.subplots(len(estimate.maps), 2, squeeze=False)
+    for (whole, enlarged), heard in zip(axes, estimate.maps, strict=True):
+        user = users.get(heard.user)
+        figures.draw_angle_range_map(whole, heard, user)
+        whole.set_title(f"Uplink of {heard.user}")
+        figures.draw_angle_range_map(enlarged, heard, user, enlarged=True)
+        enlarged.set_title("enlarged")
     return figure
 
 
@@ -112,13 +116,13 @@ def localization_figure(
     ]
     points = np.concatenate(
         [
-            figures.estimate_points(estimate, positions),
+            views.estimate_points(estimate, positions),
             *(place[None] for place in true_positions),
             *true_walls,
         ]
     )
     found = [user for user in estimate.users if user.position is not None][:_CLOSE_UPS]
-    view = figures.view_around(points)
+    view = views.view_around(points)
     figure = _figure(view, extra_width=3.6 if found else 0.0, extra_height=0.5)
     columns = figure.add_gridspec(1, 2 if found else 1, width_ratios=[2.1, 1][: 1 + bool(found)])
     ax = figures.draw_localization(
@@ -165,7 +169,7 @@ def _legend(estimate: Estimate, truth_known: bool) -> Iterable[Line2D]:
         yield Line2D([], [], color="#c9d1d6", lw=7, label="true wall")
 
 
-def _figure(view: figures.View, *, extra_width: float = 0.0, extra_height: float = 0.0) -> Figure:
+def _figure(view: views.View, *, extra_width: float = 0.0, extra_height: float = 0.0) -> Figure:
     """Make a figure whose main axes fit the view's shape without white borders."""
     width = 6.4 if view.aspect >= 1 else max(6.4 * view.aspect, 3.2)
     height = width / view.aspect

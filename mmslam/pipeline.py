@@ -11,6 +11,7 @@ from estimator.localization import locate
 from estimator.measurement import Measurement
 from estimator.storage import read_measurement, write_measurement
 from mmslam import output
+from mmslam.measurement_files import simulate_interruptibly
 from mmslam.result import result_document, to_json
 from scenes.scenario import Scenario
 from validation.truth import Truth, read_truth, truth_from_dataset
@@ -41,11 +42,9 @@ def run_scenario(
         Told each stage's steps.
     """
     with output.replacing(folder, output.refuse_foreign_results) as new:
-        from simulator.simulation import simulate  # Sionna's import takes seconds
-
         new.mkdir()
         started = time.perf_counter()
-        simulation = simulate(scenario, seed=seed, progress=progress)
+        simulation = simulate_interruptibly(scenario, seed=seed, progress=progress)
         timings = {"simulate": time.perf_counter() - started}
         measurement = simulation.measurement
         started = time.perf_counter()

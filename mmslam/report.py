@@ -16,10 +16,12 @@ from scenes.scenario import Scenario
 
 CAPTIONS = {
     "localization.png": "Plan of what was found; the user enlarged, with its error ellipses.",
-    "corrected_image.png": "The image after each ghost was folded back through its mirror.",
     "raw_image.png": "The image as measured, ghosts behind the mirrors included.",
+    "corrected_image.png": "The image after each ghost was folded back through its mirror.",
     "angle_range_map.png": "The user's pilot over angle of arrival and path length.",
 }
+
+WIDE = ("localization.png", "angle_range_map.png")  # these hold two panels
 
 
 def render_report(
@@ -54,7 +56,7 @@ def render_report(
         lstrip_blocks=True,
     )
     environment.filters["fixed"] = _fixed
-    environment.filters["triple"] = _triple
+    environment.filters["point"] = _point
     environment.filters["deviation"] = _deviation
     return environment.get_template("report.html.j2").render(
         result=result,
@@ -63,12 +65,13 @@ def render_report(
             {
                 "source": base64.b64encode(pictures[name].read_bytes()).decode("ascii"),
                 "caption": caption,
-                "name": name,
+                "wide": name in WIDE,
             }
             for name, caption in CAPTIONS.items()
             if name in pictures
         ],
         scenario=None if scenario is None else scenario_to_toml(scenario),
+        pi=math.pi,
     )
 
 
@@ -95,8 +98,8 @@ def _fixed(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
     return "—" if value is None else f"{value * scale:.{digits}f}"
 
 
-def _triple(values: list[float] | None, digits: int = 4) -> str:
-    return "—" if values is None else ", ".join(f"{value:.{digits}f}" for value in values)
+def _point(values: list[float] | None, dimensions: int) -> str:
+    return "—" if values is None else ", ".join(f"{value:.4f}" for value in values[:dimensions])
 
 
 def _deviation(variance: float | None, scale: float) -> float | None:

@@ -58,9 +58,9 @@ def _placed(body: MeshFile, changed: int, size: int) -> trimesh.Trimesh:
     mesh = _read(body.file)
     axes = np.stack([body.tangent, body.across, np.array([0.0, 0.0, 1.0])])
     mesh.vertices = body.centre + body.scale * np.asarray(mesh.vertices) @ axes
-    if not np.isfinite(mesh.vertices).all() or np.abs(mesh.vertices).max() > FARTHEST:
+    if np.abs(mesh.vertices).max() > FARTHEST:
         raise ScenarioError(
-            f"mesh file {body.file!r}: vertices must be finite and within {FARTHEST:g} m after "
+            f"mesh file {body.file!r}: vertices must lie within {FARTHEST:g} m after "
             f"scaling by {body.scale:g}; set 'scale' to metres per unit of the file"
         )
     if not mesh.area > 0:
@@ -83,6 +83,8 @@ def _read(file: str) -> trimesh.Trimesh:
         # From memory, so that a mesh cannot name other files to be read.
         content = io.BytesIO(Path(file).read_bytes())
         mesh = trimesh.load_mesh(content, file_type=kind, process=False, **options)
+        if not np.isfinite(mesh.vertices).all():
+            raise ValueError("a vertex is not finite")
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
         mesh.update_faces(mesh.nondegenerate_faces())
         mesh.remove_unreferenced_vertices()

@@ -82,12 +82,13 @@ def refined(
     """
     while True:
         edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=-1).reshape(-1, 2)
-        unique, edge_of = np.unique(edges, axis=0, return_inverse=True)
+        keys, edge_of = np.unique(edges @ [len(vertices), 1], return_inverse=True)
+        unique = np.stack(np.divmod(keys, len(vertices)), axis=-1)
         lengths = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=-1)
         halved = lengths > longest
         if not halved.any():
             return vertices, faces, labels
-        middle = np.full(len(unique), -1)
+        middle = np.full(len(keys), -1)
         middle[halved] = len(vertices) + np.arange(np.count_nonzero(halved))
         vertices = np.concatenate([vertices, vertices[unique[halved]].mean(axis=1)])
         faces, labels = _cut(faces, labels, middle[edge_of].reshape(-1, 3))

@@ -82,8 +82,8 @@ def inconsistencies(
 
 
 def signed_distance(
-    body: Upright, points: Float[np.ndarray, "*points 3"]
-) -> Float[np.ndarray, "*points"]:
+    body: Upright, points: Float[np.ndarray, "points 3"]
+) -> Float[np.ndarray, " points"]:
     """Distance from points to the surface of an upright object, negative inside [m].
 
     Without a height the object is invariant along z.
@@ -173,7 +173,7 @@ def _depth_in_plan(one: Cylinder | Box, other: Cylinder | Box) -> float:
     offset = other.centre - one.centre
     if isinstance(other, Cylinder):
         flat = one.model_copy(update={"height_m": None})
-        return other.radius_m - float(signed_distance(flat, other.centre))
+        return other.radius_m - float(signed_distance(flat, other.centre[None])[0])
     axes = [one.tangent, one.across, other.tangent, other.across]  # separating axes
     return min(_reach(one, a) + _reach(other, a) - abs(float(offset @ a)) for a in axes)
 

@@ -32,6 +32,4 @@ def simulate_echo(
     if array is None or scene.facets is None:
         shape = (scenario.base_station.element_count, frequencies.size)
         return np.zeros(shape, dtype=np.complex128)
-    return scattered(
-        scene.facets, array, array, frequencies, waves=scenario.waves, advance=advance
-    )
+    return scattered(scene.facets, array, array, frequencies, waves=scenario.waves, advance=advance)

@@ -26,7 +26,7 @@ class Facets:
 
     @property
     def extent(self) -> float:
-        """Longest edge. [m]"""
+        """Longest edge. [m]."""
         return float(np.linalg.norm(self.edges, axis=-1).max(initial=0.0))
 
 
@@ -71,7 +71,7 @@ def joined(parts: Sequence[Facets]) -> Facets:
 
 
 def profile_surface(profile: Float[np.ndarray, "vertices 3"], *, name: str = "wall") -> Surface:
-    """Make an open conducting surface of a measured or computed wall profile in 2-D. [m]"""
+    """Make an open conducting surface of a measured or computed wall profile in 2-D. [m]."""
     first = np.arange(len(profile) - 1)
     return Surface(
         name=name,

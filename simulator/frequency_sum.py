@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 ACCURACY = 1e-6
-"""Relative error asked of the transform and of the interpolation over frequency. [-]"""
+"""Relative error asked of the transform and of the interpolation over frequency. [-]."""
 
 
 def chebyshev_nodes(start: float, stop: float, count: int) -> Float[np.ndarray, " nodes"]:
@@ -91,4 +91,7 @@ class FrequencySum:
         terms = self._local.plan.execute(
             np.ascontiguousarray(amplitudes * carrier, dtype=np.complex128)
         )
-        return np.einsum("mf,mf->f", self._local.basis, terms.reshape(self.nodes.size, count))
+        spectrum: np.ndarray = np.einsum(
+            "mf,mf->f", self._local.basis, terms.reshape(self.nodes.size, count)
+        )
+        return spectrum

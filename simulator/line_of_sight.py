@@ -25,7 +25,7 @@ def in_line_of_sight(
     seen = np.asarray(paths.valid.numpy(), dtype=bool).reshape(len(elements), -1).any(axis=-1)
     for name in ("user", *names):
         scene.remove(name)
-    return seen
+    return np.asarray(seen)
 
 
 def direct_wave(
@@ -53,6 +53,7 @@ def direct_wave(
     wavelengths = speed_of_light / frequencies
     phase = np.exp(-2j * np.pi * np.remainder(distances[:, None] / wavelengths, 1.0))
     if waves == "spherical":
-        return wavelengths / (4 * np.pi * distances[:, None]) * phase
+        return np.asarray(wavelengths / (4 * np.pi * distances[:, None]) * phase)
     magnitude = np.sqrt(wavelengths / distances[:, None]) / (4 * np.pi)
-    return magnitude * np.exp(-0.25j * np.pi) * phase
+    wave: np.ndarray = magnitude * np.exp(-0.25j * np.pi) * phase
+    return wave

@@ -140,7 +140,8 @@ def _link(
     slope = (inward.direction[lit] + outward.direction[lit])[:, None, :] * facets.edges[lit]
     advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
     shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
-    return common * total(lengths / speed_of_light, amplitude * gain * shape)
+    spectrum: np.ndarray = common * total(lengths / speed_of_light, amplitude * gain * shape)
+    return spectrum
 
 
 def facet_transform(
@@ -163,7 +164,7 @@ def facet_transform(
     The average of the phase factor; 1 for a facet much smaller than the wavelength. [-]
     """
     if advances.shape[-1] == 1:
-        return np.sinc(advances[..., 0] / (2 * np.pi))
+        return np.asarray(np.sinc(advances[..., 0] / (2 * np.pi)))
     corners = np.concatenate([np.zeros_like(advances[..., :1]), advances], axis=-1)
     first, second, third = np.moveaxis(corners - corners.mean(axis=-1, keepdims=True), -1, 0)
     pairs = first * second + second * third + third * first
@@ -174,4 +175,4 @@ def facet_transform(
         if degree > 2:
             polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
         transform += polynomials[degree] * (2 * 1j**degree / math.factorial(degree + 2))
-    return transform
+    return np.asarray(transform)

@@ -1,6 +1,7 @@
 """The scene that rays are traced in: a Sionna RT scene of the scenario's surfaces."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -20,12 +21,10 @@ CLEARANCE = 2e-6
 0.1 µm, and 2 µm hides nothing that scatters at a millimetre's wavelength. [m]"""
 
 HALF_HEIGHT = 0.05
-"""Half the height of the strips that stand for line facets; rays run at z = 0. [m]"""
+"""Half the height of the strips that stand for line facets; rays run at z = 0. [m]."""
 
 RAYS_AT_ONCE = 4_000_000
 """Rays traced in one go: about 300 MB of single-precision rays."""
-
-Shape = tuple[Float[np.ndarray, "vertices 3"], Float[np.ndarray, "faces 3"]]
 
 
 def build_scene(surfaces: Sequence[Surface]) -> rt.Scene:
@@ -76,7 +75,9 @@ def facets_visible(
         towards = some - facets.centres
         side = np.sign(np.einsum("pfx,fx->pf", towards, facets.normals))
         starts = facets.centres + CLEARANCE * side[..., None] * facets.normals
-        visible[first : first + chunk] = ~blocked(scene, starts, np.broadcast_to(some, starts.shape))
+        visible[first : first + chunk] = ~blocked(
+            scene, starts, np.broadcast_to(some, starts.shape)
+        )
     return visible
 
 
@@ -91,17 +92,13 @@ def blocked(
         return np.zeros(shape, dtype=bool)
     along = ends - starts
     lengths = np.linalg.norm(along, axis=-1)
-    ray = mi.Ray3f(
-        _single(starts, mi.Point3f),
-        _single(along / lengths[..., None], mi.Vector3f),
-        mi.Float((lengths - CLEARANCE).ravel().astype(np.float32)),
-        mi.Float(0.0),
-        mi.Color0f(),
-    )
+    directions = along / lengths[..., None]
+    ray: Any = mi.Ray3f(_single(starts, mi.Point3f), _single(directions, mi.Vector3f))
+    ray.maxt = mi.Float((lengths - CLEARANCE).ravel().astype(np.float32))
     hit = scene.mi_scene.ray_test(ray)
     dr.eval(hit)  # while the scene lives: read later, the result crashes
     return np.asarray(hit.numpy(), dtype=bool).reshape(shape)
 
 
-def _single(values: Float[np.ndarray, "*rays 3"], kind: type) -> object:
+def _single(values: Float[np.ndarray, "*rays 3"], kind: Any) -> Any:
     return kind(*(mi.Float(values[..., axis].ravel().astype(np.float32)) for axis in range(3)))

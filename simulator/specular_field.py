@@ -23,6 +23,9 @@ from simulator.specular_paths import Chain
 VERTICAL = np.array([0.0, 0.0, 1.0])
 """The polarization of all antennas unless told otherwise."""
 
+SAMPLES_AT_ONCE = 1_000_000
+"""Paths times frequencies that are evaluated in one go: 16 MB for each complex quantity."""
+
 Gain = Callable[[Float[np.ndarray, "paths 3"]], Float[np.ndarray, " paths"]]
 """Field pattern of an antenna over unit directions outward from it."""
 
@@ -53,8 +56,20 @@ def reflected_field(
     polarization
         Axis of the antennas; across the ray, the field is along its projection.
     """
-    sent = transverse(chain.directions[:, 0], polarization)
-    received = transverse(chain.directions[:, -1], polarization)
+    everything = slice(0, len(chain.lengths))
+    return _field(mirrors, chain, everything, frequencies, polarization)
+
+
+def _field(
+    mirrors: Mirrors,
+    chain: Chain,
+    some: slice,
+    frequencies: Float[np.ndarray, " freqs"],
+    polarization: Float[np.ndarray, " 3"],
+) -> Complex[np.ndarray, "paths freqs"]:
+    directions = chain.directions[some]
+    sent = transverse(directions[:, 0], polarization)
+    received = transverse(directions[:, -1], polarization)
     if not chain.mirrors:
         link = dot(sent, received)[:, None] + 0j
         return np.repeat(link, frequencies.size, axis=1)
@@ -62,14 +77,13 @@ def reflected_field(
     # Two components across the ray; their unit vectors before and after each mirror.
     vectors, field = [sent, sent], [np.ones((len(sent), 1)), np.zeros((len(sent), 1))]
     for bounce, mirror in enumerate(chain.mirrors):
-        inward, outward = chain.directions[:, bounce], chain.directions[:, bounce + 1]
+        inward, outward = directions[:, bounce], directions[:, bounce + 1]
         across = _across(inward, mirrors.normals[mirror])
         within = np.cross(inward, across)
         te, tm = _project(field, vectors, across), _project(field, vectors, within)
-        cosines = chain.cosines[:, bounce]
+        cosines = chain.cosines[some, bounce]
         coefficients = materials.reflection(mirrors.materials[mirror], frequencies, cosines)
-        height = mirrors.rms_heights[mirror]
-        loss = roughness_loss(wavenumbers * height * cosines[:, None])
+        loss = roughness_loss(wavenumbers * mirrors.rms_heights[mirror] * cosines[:, None])
         field = [te * coefficients.te * loss, tm * coefficients.tm * loss]
         vectors = [across, np.cross(outward, across)]
     return _project(field, vectors, received)
@@ -138,11 +152,15 @@ def specular_response(
     S-parameters of all links; zero where no path leads. [-]
     """
     response = np.zeros((*shape, frequencies.size), dtype=np.complex128)
+    paths_at_once = max(1, SAMPLES_AT_ONCE // frequencies.size)
     for chain in chains:
         gains = transmit(chain.departures) * receive(chain.arrivals)
-        field = reflected_field(mirrors, chain, frequencies, polarization=polarization)
-        link = path_gain(chain.lengths, frequencies, waves=waves)
-        response[chain.valid] += gains[:, None] * field * link
+        source, receiver = np.nonzero(chain.valid)
+        for first in range(0, len(gains), paths_at_once):
+            some = slice(first, first + paths_at_once)
+            field = _field(mirrors, chain, some, frequencies, polarization)
+            field *= gains[some, None] * path_gain(chain.lengths[some], frequencies, waves=waves)
+            response[source[some], receiver[some]] += field  # no link twice: one path a chain
     return response
 
 

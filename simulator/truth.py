@@ -25,8 +25,16 @@ def scenario_truth(scenario: Scenario) -> xr.Dataset:
     return xr.Dataset(
         {
             "user_position": (("user", "axis"), _rows(positions), {"units": "m"}),
-            "wall_start": (("wall", "axis"), _rows([ends[0] for ends in walls.values()]), {"units": "m"}),
-            "wall_end": (("wall", "axis"), _rows([ends[1] for ends in walls.values()]), {"units": "m"}),
+            "wall_start": (
+                ("wall", "axis"),
+                _rows([ends[0] for ends in walls.values()]),
+                {"units": "m"},
+            ),
+            "wall_end": (
+                ("wall", "axis"),
+                _rows([ends[1] for ends in walls.values()]),
+                {"units": "m"},
+            ),
         },
         {
             "user": ("user", np.array(list(scenario.users), dtype=labels)),

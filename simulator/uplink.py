@@ -35,11 +35,11 @@ def simulate_uplink(
     -------
     S-parameter at each element (cylindrical waves: field). [-]
     """
-    pilot = _direct(scene, user)
+    pilot: np.ndarray = _direct(scene, user)
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])
-    return pilot + scattered(
+    over_walls: np.ndarray = scattered(
         scene.facets,
         port,
         array,
@@ -47,6 +47,8 @@ def simulate_uplink(
         waves=scene.scenario.waves,
         advance=advance,
     )
+    both: np.ndarray = pilot + over_walls
+    return both
 
 
 def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
@@ -61,4 +63,4 @@ def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freq
     )
     seen = in_line_of_sight(scene.rays, user.position, elements)
     wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)
-    return np.where(seen, gains, 0.0)[:, None] * wave
+    return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)

@@ -1,17 +1,16 @@
 """Figures: what was imaged, heard and found. Each function draws on an Axes and returns it."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.image import AxesImage
+from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Ellipse
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from estimator.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
+from validation.views import View, brightest_plane
 
 FLOOR_DB = -40.0
 """Darkest level shown, below the peak. [dB]"""
@@ -23,79 +22,8 @@ USER = "#d1495b"
 PATH = "#e09f1f"
 ON_DARK = "#8ff0e4"  # for what is overlaid on an image
 
+_ENLARGED = 20  # samples of a map to each side of its peak, when enlarged
 _MOST_PIXELS = 1200  # along one side of a picture; a finer image is reduced to it
-_ENERGY_KEPT = 0.98  # of an image's strong pixels inside its crop, along each axis
-
-
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """The part of the plane z = 0 that a figure shows."""
-
-    left: float  # [m]
-    right: float  # [m]
-    bottom: float  # [m]
-    top: float  # [m]
-
-    @property
-    def aspect(self) -> float:
-        """Width over height."""
-        return (self.right - self.left) / (self.top - self.bottom)
-
-
-def view_around(
-    points: Float[np.ndarray, "points 3"], *, margin: float = 0.08, narrowest: float = 0.45
-) -> View:
-    """Choose a view that holds all points.
-
-    Parameters
-    ----------
-    points
-        What must be inside; NaN is ignored. [m]
-    margin
-        Space on each side, over the larger side of the view. [-]
-    narrowest
-        Least ratio of the two sides, so that a row of points still makes a picture. [-]
-    """
-    low, high = np.nanmin(points[:, :2], axis=0), np.nanmax(points[:, :2], axis=0)
-    size = high - low
-    larger = max(float(size.max()), 1e-3)
-    half = np.maximum(size, narrowest * larger) / 2 + margin * larger
-    centre = (low + high) / 2
-    (left, bottom), (right, top) = centre - half, centre + half
-    return View(left=float(left), right=float(right), bottom=float(bottom), top=float(top))
-
-
-def estimate_points(
-    estimate: Estimate, positions: Float[np.ndarray, "positions 3"]
-) -> Float[np.ndarray, "points 3"]:
-    """Collect what a plan of an estimate must show: array, mirrors, targets, users, paths."""
-    points = [positions]
-    points += [np.stack([mirror.start, mirror.end]) for mirror in estimate.mirrors]
-    points += [target.position[None] for target in estimate.targets]
-    for user in estimate.users:
-        points += [place for place in (user.path,) if place is not None]
-        points += [place[None] for place in (user.position,) if place is not None]
-    return np.concatenate(points)
-
-
-def bright_points(image: Image, *, threshold_db: float = -20.0) -> Float[np.ndarray, "2 3"]:
-    """Return two corners of the box that holds nearly all of what is bright in an image.
-
-    Parameters
-    ----------
-    image
-        In a plane.
-    threshold_db
-        What counts as bright, relative to the peak.
-    """
-    power = np.abs(_plane(image)) ** 2
-    power = np.where(power >= power.max() * 10 ** (threshold_db / 10), power, 0.0)
-    corners = np.zeros((2, 3))
-    for axis, coordinate in enumerate((image.grid.x, image.grid.y)):
-        share = np.cumsum(power.sum(axis=1 - axis))
-        ends = np.searchsorted(share / share[-1], [(1 - _ENERGY_KEPT) / 2, (1 + _ENERGY_KEPT) / 2])
-        corners[:, axis] = coordinate[np.minimum(ends, coordinate.size - 1)]
-    return corners
 
 
 def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB) -> Axes:
@@ -112,13 +40,11 @@ def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB
     floor_db
         The darkest level.
     """
-    magnitude = np.abs(_plane(image))
+    magnitude = np.abs(brightest_plane(image))
     x, columns = _inside(image.grid.x, view.left, view.right)
     y, rows = _inside(image.grid.y, view.bottom, view.top)
     magnitude, x, y = _brightest_of_blocks(magnitude[columns, rows], x, y)
-    peak = magnitude.max()
-    with np.errstate(divide="ignore"):
-        level = np.maximum(20 * np.log10(magnitude / peak), floor_db)
+    level = _decibels(magnitude, magnitude.max(), floor_db)
     dx, dy = (_half_step(axis) for axis in (x, y))
     mesh = ax.imshow(
         level.T,
@@ -140,14 +66,14 @@ def overlay_mirrors(
     *,
     colour: str = ON_DARK,
     width: float = 1.2,
-    outlined: str | None = "black",
+    line: bool = True,
 ) -> Axes:
-    """Draw the mirrors found as dashed lines with their extents and numbers."""
-    outline = [withStroke(linewidth=width + 1.4, foreground=outlined)] if outlined else []
+    """Draw the mirrors found: strokes at their ends, numbers and, if asked, a dashed line."""
     for index, mirror in enumerate(mirrors):
         ends = np.stack([mirror.start, mirror.end])
         angle = np.degrees(np.arctan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0]))
-        ax.plot(ends[:, 0], ends[:, 1], "--", color=colour, lw=width, path_effects=outline)
+        if line:
+            ax.plot(ends[:, 0], ends[:, 1], "--", color=colour, lw=width)
         across = (2, 0, float(angle))  # a marker of two corners: a stroke across the wall
         ax.plot(ends[:, 0], ends[:, 1], ls="", marker=across, color=colour, ms=11, mew=width)
         behind = -10 * mirror.normal
@@ -200,6 +126,14 @@ def overlay_users(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER
     return ax
 
 
+def overlay_paths(ax: Axes, users: Iterable[UserEstimate], *, width: float = 1.6) -> Axes:
+    """Draw the path over which each user was heard."""
+    for user in users:
+        if user.path is not None:
+            ax.plot(user.path[:, 0], user.path[:, 1], color=PATH, lw=width, zorder=3)
+    return ax
+
+
 def overlay_array(
     ax: Axes, positions: Float[np.ndarray, "positions 3"], *, colour: str = ARRAY
 ) -> Axes:
@@ -219,7 +153,12 @@ def overlay_array(
 
 
 def draw_angle_range_map(
-    ax: Axes, heard: AngleRangeMap, user: UserEstimate | None, *, floor_db: float = FLOOR_DB
+    ax: Axes,
+    heard: AngleRangeMap,
+    user: UserEstimate | None,
+    *,
+    enlarged: bool = False,
+    floor_db: float = FLOOR_DB,
 ) -> Axes:
     """Draw the matched filter of a pilot over angle and path length, and mark its peak.
 
@@ -231,24 +170,35 @@ def draw_angle_range_map(
         The map.
     user
         Whose angle and path length are marked, if they were found.
+    enlarged
+        Whether only the surroundings of the mark (else of the peak) are shown.
     floor_db
         The darkest level, below the peak.
     """
-    magnitude, aoa, length = _brightest_of_blocks(
-        np.abs(heard.values), np.degrees(heard.aoa), heard.path_length
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        level = np.maximum(20 * np.log10(magnitude / magnitude.max()), floor_db)
-    da, dr = _half_step(aoa), _half_step(length)
-    mesh = ax.imshow(
+    magnitude = np.abs(heard.values)
+    peak = magnitude.max()
+    aoa, length = np.degrees(heard.aoa), heard.path_length
+    if enlarged:
+        around = np.unravel_index(int(np.argmax(magnitude)), magnitude.shape)
+        if user is not None and user.aoa is not None and user.path_length is not None:
+            around = (
+                np.argmin(np.abs(heard.aoa - user.aoa)),
+                np.argmin(np.abs(length - user.path_length)),
+            )
+        part = tuple(slice(max(int(n) - _ENLARGED, 0), int(n) + _ENLARGED + 1) for n in around)
+        magnitude, aoa, length = magnitude[part], aoa[part[0]], length[part[1]]
+    magnitude, aoa, length = _brightest_of_blocks(magnitude, aoa, length)
+    level = _decibels(magnitude, peak, floor_db)
+    # A mesh, not a picture: angles are spaced evenly in their cosine.
+    mesh = ax.pcolormesh(
+        aoa,
+        length,
         level.T,
-        origin="lower",
-        aspect="auto",
-        extent=(aoa[0] - da, aoa[-1] + da, length[0] - dr, length[-1] + dr),
         cmap="magma",
         vmin=floor_db,
         vmax=0.0,
-        interpolation="nearest",
+        shading="gouraud" if enlarged else "nearest",
+        rasterized=True,
     )
     _level_bar(ax, mesh, "matched filter relative to the peak [dB]")
     for estimate in () if user is None else (user, *user.alternatives):
@@ -256,7 +206,12 @@ def draw_angle_range_map(
             continue
         angle = float(np.degrees(estimate.aoa))
         chosen = estimate is user
-        ax.plot(angle, estimate.path_length, "o", mfc="none", mec=ON_DARK, ms=14, mew=1.5)
+        if not aoa[0] <= angle <= aoa[-1] or not length[0] <= estimate.path_length <= length[-1]:
+            continue
+        if enlarged:  # on the bright peak itself
+            ax.plot(angle, estimate.path_length, "+", mec=MIRROR, ms=12, mew=1.5)
+        else:
+            ax.plot(angle, estimate.path_length, "o", mfc="none", mec=ON_DARK, ms=14, mew=1.5)
         on_right = angle > (aoa[0] + aoa[-1]) / 2
         ax.annotate(
             f"{angle:.3f}°, {estimate.path_length:.4f} m" if chosen else "alternative",
@@ -302,11 +257,9 @@ def draw_localization(
     for wall in true_walls:
         ax.plot(wall[:, 0], wall[:, 1], color="#c9d1d6", lw=7, solid_capstyle="butt", zorder=1)
     overlay_array(ax, positions)
-    overlay_mirrors(ax, estimate.mirrors, colour=MIRROR, width=1.8, outlined=None)
+    overlay_mirrors(ax, estimate.mirrors, colour=MIRROR, width=1.8)
     overlay_targets(ax, estimate.targets, colour=MIRROR)
-    for user in estimate.users:
-        if user.path is not None:
-            ax.plot(user.path[:, 0], user.path[:, 1], color=PATH, lw=1.6, zorder=3)
+    overlay_paths(ax, estimate.users)
     for place in true_positions:
         ax.plot(*place[:2], "o", mfc="none", mec=INK, ms=15, mew=1.4, zorder=7)
     overlay_users(ax, estimate.users)
@@ -364,7 +317,17 @@ def draw_close_up(
     return ax
 
 
-def _level_bar(ax: Axes, mesh: AxesImage, label: str) -> None:
+def _decibels(
+    magnitude: Float[np.ndarray, "x y"], peak: float, floor_db: float
+) -> Float[np.ndarray, "x y"]:
+    lowest = 10 ** (floor_db / 20) * peak
+    if lowest <= 0:  # nothing at all was imaged
+        return np.full_like(magnitude, floor_db)
+    level: np.ndarray = 20 * np.log10(np.maximum(magnitude, lowest) / peak)
+    return level
+
+
+def _level_bar(ax: Axes, mesh: ScalarMappable, label: str) -> None:
     figure = ax.get_figure()
     if figure is not None:  # inset: as high as the picture, whatever its aspect
         beside = ax.inset_axes((1.02, 0.0, 0.03, 1.0))
@@ -384,11 +347,6 @@ def _metres(ax: Axes, view: View) -> Axes:
         ylabel="y, boresight [m]",
     )
     return ax
-
-
-def _plane(image: Image) -> Float[np.ndarray, "x y"]:
-    magnitude: np.ndarray = np.abs(image.values)
-    return magnitude if magnitude.ndim == 2 else magnitude.max(axis=2)
 
 
 def _inside(

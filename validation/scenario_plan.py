@@ -8,7 +8,7 @@ from matplotlib.patches import Circle, Polygon
 from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn
 from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.scenario import Scenario
-from validation import figures
+from validation import figures, views
 
 MATERIAL_COLOURS = {"absorber": "#3d3d3d", "metal": figures.MIRROR}
 _BEAM = 0.25  # length of the wedge that shows where an antenna looks, over the view's size
@@ -29,7 +29,7 @@ def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
     users = {name: user.position for name, user in scenario.users.items()}
     points = [station.element_positions, *outlines.values()]
     points += [place[None] for place in users.values()]
-    view = figures.view_around(np.concatenate(points))
+    view = views.view_around(np.concatenate(points))
     size = max(view.right - view.left, view.top - view.bottom)
     ax.grid(color="#dfe4e8", lw=0.6)
     ax.set_axisbelow(True)

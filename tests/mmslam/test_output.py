@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -193,6 +194,29 @@ def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path: Path) -> None:
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, kept)
+    assert everything_below(tmp_path) == []
+
+
+def test_a_writer_that_is_late_leaves_nothing_behind_either(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As Zarr's threads do: they make the folder anew after it was removed, twice here.
+    late: list[Path] = []
+
+    def write_once_more(_: float) -> None:
+        if len(late) < 2:
+            late.append(store)
+            store.mkdir(parents=True)
+            (store / "chunk").write_text("late")
+
+    monkeypatch.setattr(time, "sleep", write_once_more)
+    with (  # noqa: PT012
+        pytest.raises(ValueError, match="full"),
+        replacing(tmp_path / "a" / "out", refuse_foreign_results) as new,
+    ):
+        store = new / "measurement.zarr"
+        raise ValueError("full")
+    assert len(late) == 2
     assert everything_below(tmp_path) == []
 
 

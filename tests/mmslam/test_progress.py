@@ -1,30 +1,57 @@
 import io
+import time
 
 import pytest
 from rich.console import Console
 
+from mmslam import progress
 from mmslam.progress import StageProgress
 
 
-def shown(*, terminal: bool, seconds: float, monkeypatch: pytest.MonkeyPatch) -> str:
-    clock = iter(seconds / 4 * step for step in range(100))
-    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+def shown(*, terminal: bool, step: float) -> str:
+    """Run a stage of two steps, the first of which takes ``step`` seconds."""
     written = io.StringIO()
     console = Console(file=written, force_terminal=terminal, width=80)
     with StageProgress(console) as report:
-        for done in range(1, 6):
-            report("echo", done, 5)
+        report("echo", 0, 2)
+        time.sleep(step)
+        report("echo", 1, 2)
+        report("echo", 2, 2)
     return written.getvalue()
 
 
-def test_a_stage_of_less_than_a_second_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert shown(terminal=True, seconds=0.9, monkeypatch=monkeypatch) == ""
-    assert shown(terminal=False, seconds=0.9, monkeypatch=monkeypatch) == ""
+def test_a_stage_of_less_than_a_second_shows_nothing() -> None:
+    assert shown(terminal=True, step=0.01) == ""
+    assert shown(terminal=False, step=0.01) == ""
 
 
-def test_a_longer_stage_shows_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "echo" in shown(terminal=True, seconds=4.0, monkeypatch=monkeypatch)
+def test_a_longer_stage_shows_a_bar_even_within_its_first_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
+    text = shown(terminal=True, step=0.5)
+    assert "echo" in text
+    assert "0 of 2" in text
 
 
 def test_a_longer_stage_leaves_one_line_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert shown(terminal=False, seconds=4.0, monkeypatch=monkeypatch) == "echo: 4.0 s\n"
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
+    text = shown(terminal=False, step=0.1)
+    assert text.startswith("echo: ")
+    assert text.count("\n") == 1
+
+
+def test_an_interrupted_stage_leaves_no_bar_and_no_thread_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    import threading
+
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
+    before = threading.active_count()
+    console = Console(file=io.StringIO(), force_terminal=True)
+    with pytest.raises(KeyboardInterrupt), StageProgress(console) as report:  # noqa: PT012
+        report("echo", 0, 2)
+        time.sleep(0.2)
+        raise KeyboardInterrupt
+    time.sleep(0.1)
+    assert threading.active_count() == before

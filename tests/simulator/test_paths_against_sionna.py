@@ -6,6 +6,7 @@ single precision, Mitsuba's intersections.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import mitsuba as mi
 import numpy as np
@@ -14,11 +15,12 @@ from scipy.constants import epsilon_0, speed_of_light
 from scipy.spatial.transform import Rotation
 
 from estimator import engine
+from simulator import ray_scene
 from simulator.materials import Conductor, Dielectric, Material
 from simulator.mirrors import Mirrors
 from simulator.permittivity import ConstantPermittivity
 from simulator.specular_field import reflected_field
-from simulator.specular_paths import find_chains
+from simulator.specular_paths import Blocked, find_chains
 
 mi.set_variant(engine.mitsuba_variant())
 
@@ -33,6 +35,14 @@ SHORTEST_LEG = 1e-2
 
 RAYS = 300_000
 """Rays that the path solver launches to find candidates."""
+
+THICKNESS = (0.5e-3, 5e-3)
+"""Thickness of slabs. Beyond some 80 rad of phase across the slab the single-precision sine of
+Dr.Jit errs by 1e-4 and more, measured on the solver's own slab formula. [m]"""
+
+NULL = 0.01
+"""A coefficient below this (a slab's null, Brewster's angle) counts as this: hits that are
+rounded to 1 µm on a leg of centimetres turn the angle by 1e-4 and the coefficient by as much."""
 
 SCENES = 60
 
@@ -127,13 +137,13 @@ def random_scene(seed: int) -> Scene:
     constants = [
         (1.0 - 1e9j, 0.1)  # as good as a conductor
         if rng.random() < 0.3
-        else (complex(rng.uniform(1.5, 6.0), -rng.uniform(0.0, 0.3)), rng.uniform(1e-3, 2e-2))
+        else (complex(rng.uniform(1.5, 6.0), -rng.uniform(0.0, 0.3)), rng.uniform(*THICKNESS))
         for _ in objects
     ]
     return Scene(objects, constants, np.array(points))
 
 
-def our_paths(scene: Scene) -> Paths:
+def our_paths(scene: Scene, blocked: Blocked | None = None) -> Paths:
     surfaces: list[Material] = []
     for (permittivity, thickness), faces in zip(scene.constants, scene.objects, strict=True):
         perfect = permittivity.imag < -1e6
@@ -150,12 +160,12 @@ def our_paths(scene: Scene) -> Paths:
     )
     source, receivers = scene.points[:1], scene.points[1:]
 
-    def blocked(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    def crossed(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
         met: np.ndarray = np.any(crossings(scene.corners, starts, ends), axis=1)
         return met
 
     found = {}
-    for chain in find_chains(mirrors, source, receivers, blocked=blocked):
+    for chain in find_chains(mirrors, source, receivers, blocked=blocked or crossed):
         field = reflected_field(mirrors, chain, np.array([FREQUENCY]))[:, 0]
         spread = speed_of_light / FREQUENCY / (4 * np.pi * chain.lengths)
         for index, receiver in enumerate(np.nonzero(chain.valid)[1].tolist()):
@@ -166,7 +176,7 @@ def our_paths(scene: Scene) -> Paths:
     return found
 
 
-def sionna_paths(scene: Scene) -> Paths:
+def sionna_scene(scene: Scene) -> tuple[rt.Scene, list[rt.SceneObject]]:
     theirs = rt.Scene()
     theirs.frequency = FREQUENCY
     theirs.tx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
@@ -190,6 +200,11 @@ def sionna_paths(scene: Scene) -> Paths:
         )
         bodies.append(rt.SceneObject(mi_mesh=mesh, name=f"object-{index}", radio_material=material))
     theirs.edit(add=bodies)
+    return theirs, bodies
+
+
+def sionna_paths(scene: Scene) -> Paths:
+    theirs, bodies = sionna_scene(scene)
     theirs.add(rt.Transmitter("source", position=scene.points[0].tolist()))
     for index, point in enumerate(scene.points[1:]):
         theirs.add(rt.Receiver(f"receiver-{index}", position=point.tolist()))
@@ -275,14 +290,26 @@ def test_chains_delays_and_coefficients_are_those_of_the_path_solver(seed: int) 
     assert both
     for key in both:
         assert ours[key].length == pytest.approx(theirs[key].length, abs=1e-6), key
+        free_space = speed_of_light / FREQUENCY / (4 * np.pi * ours[key].length)
         error = abs(ours[key].amplitude - theirs[key].amplitude)
-        assert error < 0.01 * abs(ours[key].amplitude), key
+        assert error < 0.01 * max(abs(ours[key].amplitude), NULL * free_space), key
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_occlusion_by_mitsuba_leaves_the_same_paths(seed: int) -> None:
+    scene = random_scene(seed)
+    theirs, _ = sionna_scene(scene)
+    exact, traced = our_paths(scene), our_paths(scene, partial(ray_scene.blocked, theirs))
+    for key in exact.keys() ^ traced.keys():
+        path = exact[key] if key in exact else traced[key]
+        assert distance_from_edges(path, scene.corners) < EDGE
+    assert len(exact.keys() & traced.keys()) > 1
 
 
 def test_the_random_scenes_have_paths_of_every_number_of_bounces() -> None:
     counts = np.zeros(4, dtype=int)
-    for seed in range(12):
+    for seed in range(6):
         counts += np.bincount(
             [len(sequence) for _, sequence in our_paths(random_scene(seed))], minlength=4
         )
-    assert np.all(counts >= 5), counts
+    assert np.all(counts >= 3), counts

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import speed_of_light
@@ -217,3 +218,12 @@ def test_links_without_a_path_stay_silent() -> None:
     wall = plane([0.0, 1.0, 0.0], Conductor())
     response = specular_response(wall, (), FREQUENCIES, (2, 3))
     np.testing.assert_array_equal(response, np.zeros((2, 3, 101)))
+
+
+def test_summing_in_pieces_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = plane([0.0, 1.0, 0.2], GYPSUM)
+    points = np.random.default_rng(5).uniform([-1, 0.5, -1], [1, 2, 1], (12, 3))
+    chains = find_chains(wall, points[:4], points[4:], blocked=clear_air)
+    whole = specular_response(wall, chains, FREQUENCIES, (4, 8))
+    monkeypatch.setattr(specular_field, "SAMPLES_AT_ONCE", 1)
+    np.testing.assert_array_equal(specular_response(wall, chains, FREQUENCIES, (4, 8)), whole)

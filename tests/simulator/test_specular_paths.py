@@ -228,7 +228,7 @@ def test_a_receiver_on_a_surface_is_seen_from_just_off_it() -> None:
     assert chain.lengths[0] == pytest.approx(np.hypot(1.0, 0.5), abs=2e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_exchanging_both_ends_reverses_every_path(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -242,7 +242,7 @@ def test_exchanging_both_ends_reverses_every_path(seed: int) -> None:
         assert length == pytest.approx(reversed_back[link], rel=LENGTH_ROUNDING)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_moving_the_whole_scene_changes_no_path(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -265,11 +265,11 @@ def test_leaving_out_mirrors_beyond_the_beams_loses_no_path(
         return np.array([mirror != (*sequence, None)[-2:][0] for mirror in range(len(mirrors))])
 
     rng = np.random.default_rng(0)
-    scenes = [(random_plates(rng, 6), rng.uniform(-1, 1, (8, 3))) for _ in range(10)]
+    scenes = [(random_plates(rng, 5), rng.uniform(-1, 1, (40, 3))) for _ in range(2)]
 
     def all_links() -> list[dict[tuple[int, int, tuple[int, ...]], float]]:
         return [
-            as_links(find_chains(mirrors, points[:3], points[3:], blocked=solid(mirrors)))
+            as_links(find_chains(mirrors, points[:20], points[20:], blocked=solid(mirrors)))
             for mirrors, points in scenes
         ]
 
@@ -283,7 +283,7 @@ def test_tracing_in_pieces_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     rng = np.random.default_rng(1)
     mirrors, points = random_plates(rng, 6), rng.uniform(-1, 1, (20, 3))
     whole = find_chains(mirrors, points[:9], points[9:], blocked=solid(mirrors))
-    monkeypatch.setattr(specular_paths, "PAIRS_AT_ONCE", 7)
+    monkeypatch.setattr(specular_paths, "PAIRS_AT_ONCE", 40)
     pieces = find_chains(mirrors, points[:9], points[9:], blocked=solid(mirrors))
     assert [chain.mirrors for chain in whole] == [chain.mirrors for chain in pieces]
     for one, other in zip(whole, pieces, strict=True):

@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
 
 from estimator.estimate import AngleRangeMap, Estimate, Image, UserEstimate
 from estimator.pixel_grid import PixelGrid
-from validation import figures
+from validation import figures, views
 
 
 @pytest.fixture
@@ -33,14 +35,20 @@ def level_at(ax: Axes, x: float, y: float) -> float:
     return float(pixels[row, column])
 
 
-VIEW = figures.View(left=-0.5, right=0.5, bottom=0.2, top=1.4)
+VIEW = views.View(left=-0.5, right=0.5, bottom=0.2, top=1.4)
 
 
 def test_a_point_is_drawn_where_it_is_at_zero_decibels(ax: Axes) -> None:
     figures.draw_image(ax, point_image(0.23, 1.1), view=VIEW)
     assert level_at(ax, 0.23, 1.1) == pytest.approx(0.0)
-    assert level_at(ax, -0.23, 1.1) == figures.FLOOR_DB  # -60 dB, cut at the floor
+    assert level_at(ax, -0.23, 1.1) == pytest.approx(figures.FLOOR_DB)  # -60 dB, cut at the floor
     assert ax.images[0].get_clim() == (figures.FLOOR_DB, 0.0)
+
+
+def test_an_image_of_nothing_is_dark_and_no_error(ax: Axes) -> None:
+    image = point_image(0.0, 0.8)
+    figures.draw_image(ax, Image(values=0 * image.values, grid=image.grid), view=VIEW)
+    assert level_at(ax, 0.0, 0.8) == figures.FLOOR_DB
 
 
 def test_a_metre_is_as_long_in_x_as_in_y(ax: Axes) -> None:
@@ -54,21 +62,21 @@ def test_a_thin_bright_line_survives_the_reduction_of_a_large_image(ax: Axes) ->
     grid = PixelGrid.spanning(x=(0.0, 1.0), y=(0.0, 0.1), spacing=1 / 5000)
     values = np.full(grid.shape, 1e-3, dtype=np.complex128)
     values[3333, :] = 1.0
-    view = figures.View(left=0.0, right=1.0, bottom=0.0, top=0.1)
+    view = views.View(left=0.0, right=1.0, bottom=0.0, top=0.1)
     figures.draw_image(ax, Image(values=values, grid=grid), view=view)
     assert max(np.asarray(ax.images[0].get_array()).shape) <= 1200
     assert level_at(ax, 3333 / 5000, 0.05) == pytest.approx(0.0)
 
 
 def test_the_crop_holds_what_is_bright_and_not_the_empty_room() -> None:
-    low, high = figures.bright_points(point_image(0.23, 1.1))
+    low, high = views.bright_points(point_image(0.23, 1.1))
     # The two corners are pixel centres: the bright one's, to within a pixel.
     np.testing.assert_allclose(low, [0.23, 1.1, 0.0], atol=0.01)
     np.testing.assert_allclose(high, [0.23, 1.1, 0.0], atol=0.01)
 
 
 def test_a_view_holds_all_its_points_with_a_margin() -> None:
-    view = figures.view_around(np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [np.nan] * 3]))
+    view = views.view_around(np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [np.nan] * 3]))
     assert view.left < 0.0
     assert view.right > 1.0
     assert view.bottom < 0.0
@@ -77,16 +85,40 @@ def test_a_view_holds_all_its_points_with_a_margin() -> None:
 
 
 def test_the_peak_of_a_map_is_marked_in_degrees_and_metres(ax: Axes) -> None:
-    aoa, length = np.radians(np.linspace(60, 120, 61)), np.linspace(1.0, 2.0, 101)
+    aoa = np.arccos(np.linspace(0.9, -0.9, 61))
+    length = np.linspace(1.0, 2.0, 101)
     values = np.full((61, 101), 1e-3, dtype=np.complex128)
-    values[10, 80] = 1.0  # 70°, 1.8 m
+    values[np.argmin(np.abs(aoa - np.radians(70.0))), 80] = 1.0  # 70°, 1.8 m
     heard = AngleRangeMap(values=values, aoa=aoa, path_length=length, user="ann")
     user = UserEstimate(name="ann", status="found", aoa=np.radians(70.0), path_length=1.8)
     figures.draw_angle_range_map(ax, heard, user)
-    assert level_at(ax, 70.0, 1.8) == pytest.approx(0.0)
-    marks = [tuple(np.ravel(line.get_data())) for line in ax.lines]
+    mesh = ax.collections[0]
+    assert isinstance(mesh, QuadMesh)
+    levels = np.asarray(mesh.get_array())
+    row, column = (int(n) for n in np.unravel_index(np.argmax(levels), levels.shape))
+    coordinates = np.asarray(mesh.get_coordinates(), dtype=np.float64)
+    corners = coordinates[row : row + 2, column : column + 2].reshape(4, 2)
+    assert levels[row, column] == pytest.approx(0.0)
+    # The bright cell holds the peak, though angles are spaced evenly in their cosine.
+    assert (corners.min(axis=0) < (70.0, 1.8)).all()
+    assert (corners.max(axis=0) > (70.0, 1.8)).all()
+    marks = [np.asarray(line.get_xydata(), dtype=np.float64)[0] for line in ax.lines]
     np.testing.assert_allclose(marks, [(70.0, 1.8)])
     assert [text.get_text() for text in ax.texts] == ["70.000°, 1.8000 m"]
+
+
+def test_the_enlarged_map_shows_the_surroundings_of_the_mark_only(ax: Axes) -> None:
+    aoa, length = np.arccos(np.linspace(0.9, -0.9, 401)), np.linspace(0.1, 2.0, 301)
+    values = np.full((401, 301), 1e-3, dtype=np.complex128)
+    values[200, 10] = 1.0
+    heard = AngleRangeMap(values=values, aoa=aoa, path_length=length, user="ann")
+    user = UserEstimate(name="ann", status="found", aoa=np.radians(70.0), path_length=1.8)
+    figures.draw_angle_range_map(ax, heard, user, enlarged=True)
+    assert ax.get_xlim()[0] < 70.0 < ax.get_xlim()[1]
+    assert ax.get_ylim()[0] < 1.8 < ax.get_ylim()[1]
+    assert ax.get_xlim()[1] - ax.get_xlim()[0] < 15.0
+    # The peak elsewhere still sets the scale.
+    assert np.asarray(ax.collections[0].get_array()).max() == pytest.approx(figures.FLOOR_DB)
 
 
 def test_a_close_up_counts_millimetres_from_the_truth(ax: Axes) -> None:
@@ -97,12 +129,12 @@ def test_a_close_up_counts_millimetres_from_the_truth(ax: Axes) -> None:
         covariance=np.diag([4e-8, 1e-8, 0.0]),
     )
     figures.draw_close_up(ax, user, np.array([1.0, 0.8, 0.0]))
-    drawn = ax.lines[-2].get_xydata()
+    drawn = np.asarray(ax.lines[-2].get_xydata(), dtype=np.float64)
     np.testing.assert_allclose(drawn, [[0.3, 0.4]], atol=1e-9)
     assert ax.get_title() == "ann: 0.50 mm off"
     # 0.2 mm and 0.1 mm of deviation: full axes 0.4 mm by 0.2 mm, the longer along x.
     inner = ax.patches[-1]
-    assert isinstance(inner, figures.Ellipse)
+    assert isinstance(inner, Ellipse)
     assert (inner.width, inner.height) == pytest.approx((0.4, 0.2))
     assert abs(np.sin(np.radians(inner.angle))) == pytest.approx(0.0, abs=1e-9)
 
