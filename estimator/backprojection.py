@@ -5,18 +5,17 @@ relative to the array's centre, where :math:`r_m - R = (q^2 - 2 p \cdot q) / (r_
 cancellation, and what is common to all channels is applied once per point in float64.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from jaxtyping import Complex, Float
-from numpy.polynomial import Chebyshev, Polynomial
 from scipy.constants import speed_of_light
 
 from estimator import engine
 from estimator.measurement import Echo, MeasurementError, Uplink
+from estimator.phasor import sincos_of_turns
 from estimator.range_profiles import RangeProfiles, range_profiles
 
 POINTS_PER_LANE = 4
@@ -230,7 +229,9 @@ def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 p
     # A length is convex: over the box around the points it is largest at a corner.
     if _longest_path(profiles, corners) <= profiles.unambiguous:
         return
-    longest = _longest_path(profiles, points)
+    # It is convex over the antennas' places as well: at most what the box around them gives.
+    bound = profiles.passes * sum(_farthest_corner(leg, points) for leg in profiles.legs)
+    longest = _longest_path(profiles, points[:, bound > profiles.unambiguous])
     if longest > profiles.unambiguous:
         ways = profiles.passes * len(profiles.legs)
         raise MeasurementError(
@@ -240,9 +241,19 @@ def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 p
         )
 
 
+def _farthest_corner(
+    leg: Float[np.ndarray, "channels 3"], points: Float[np.ndarray, "3 points"]
+) -> Float[np.ndarray, " points"]:
+    """Distance of each point to the farthest corner of the box around a leg's antennas. [m]."""
+    low, high = leg.min(axis=0)[:, None], leg.max(axis=0)[:, None]
+    far = np.maximum(np.abs(points - low), np.abs(points - high))
+    distance: np.ndarray = np.sqrt(np.einsum("xp,xp->p", far, far))
+    return distance
+
+
 def _longest_path(profiles: RangeProfiles, points: Float[np.ndarray, "3 points"]) -> float:
     longest = 0.0
-    for channel in zip(*profiles.legs, strict=True):
+    for channel in zip(*profiles.legs, strict=True) if points.size else ():
         path = sum(np.linalg.norm(points - end[:, None], axis=0) for end in channel)
         longest = max(longest, profiles.passes * float(np.max(path)))
     return longest
@@ -363,7 +374,7 @@ def _sum_over_channels(
                 profile_re = dr.fma(profile_re, v, dr.reinterpret_array(arrays.Float, low))
                 profile_im = dr.fma(profile_im, v, dr.reinterpret_array(arrays.Float, high))
             turn = shift * turns
-            sine, cosine = _sincos_of_turns(turn - dr.round(turn))
+            sine, cosine = sincos_of_turns(turn)
             if amplitude_ratio:
                 sine, cosine, weight = sine * ratio, cosine * ratio, dr.fma(ratio, ratio, weight)
             re = dr.fma(profile_re, cosine, dr.fma(-profile_im, sine, re))
@@ -376,27 +387,6 @@ def _sum_over_channels(
     start = (arrays.UInt32(0), arrays.UInt32(0), *zeros)
     _, _, *sums = dr.while_loop(start, lambda channel, *_: channel < end, add_channel)
     return _by_three(sums)
-
-
-def _half_turn_series(values: Callable[[np.ndarray], np.ndarray]) -> list[float]:
-    """Coefficients, highest first, of a function of the square of half turns in |t| ≤ ½."""
-    series = Chebyshev.interpolate(values, 3, domain=[0.0, 0.25])
-    return [float(value) for value in series.convert(kind=Polynomial).coef[::-1]]
-
-
-_SINE_SERIES = _half_turn_series(lambda square: np.pi * np.sinc(np.sqrt(square)))
-_COSINE_SERIES = _half_turn_series(lambda square: np.cos(np.pi * np.sqrt(square)))
-
-
-def _sincos_of_turns(turn: Any) -> tuple[Any, Any]:
-    """Sine and cosine of 2π·turn for |turn| ≤ ½, to 2e-5: half of Dr.Jit's own cost."""
-    square = turn * turn
-    sine, cosine = _SINE_SERIES[0], _COSINE_SERIES[0]
-    for a, b in zip(_SINE_SERIES[1:], _COSINE_SERIES[1:], strict=True):
-        sine, cosine = dr.fma(square, sine, a), dr.fma(square, cosine, b)
-    sine = sine * turn
-    double = sine + sine
-    return double * cosine, 1.0 - double * sine
 
 
 def _by_three(values: list[Any] | tuple[Any, ...]) -> list[tuple[Any, Any, Any]]:

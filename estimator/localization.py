@@ -19,6 +19,7 @@ from estimator.mirrors import (
     detect_mirrors,
     echo_reach,
     echo_resolution,
+    loose_peaks,
     survey,
     unaliased_sine,
 )
@@ -74,6 +75,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     walls: tuple[Wall, ...] = ()
     seen: tuple[tuple[int, ...], ...] = ()
     local_echo = looked_over = None
+    loose = np.zeros((0, 3))
     if echo is None:
         notes.append("no echo was measured, so nothing is known of mirrors")
     else:
@@ -81,6 +83,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         local_echo = replace(echo, positions=frame.to_local(echo.positions))
         looked_over = survey(local_echo)
         lines = detect_mirrors(local_echo, looked_over)
+        loose = loose_peaks(local_echo, looked_over, lines)
         lines, walls, seen = _folded(lines)
         timings["mirrors"] = time.perf_counter() - started
     tell("estimate", 1, steps)
@@ -102,6 +105,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             walls,
             cell=echo_resolution(local_echo).across_ray if local_echo else 0.0,
             imaged=local_echo is not None,
+            loose=loose,
         )
         users.append(_in_world(found, frame))
         timings[f"user {uplink.user}"] = time.perf_counter() - started

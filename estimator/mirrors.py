@@ -1,5 +1,6 @@
 """Mirrors: the walls that an image shows, found without help."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from estimator.backprojection import backproject, focus, prepare
 from estimator.line_search import Resolution, find_lines, significant_peaks
 from estimator.measurement import Echo, frequency_step
 from estimator.mirror_fit import FittedLine, fit_line
+from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 
 SIDELOBE_LEVEL_DB = 50
@@ -98,10 +100,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     one is seen directly or through another.
     """
     resolution = echo_resolution(echo)
-    # The taper widens the resolution by about 1.4.
-    coarse = Resolution(
-        along_ray=1.4 * resolution.along_ray, across_ray=1.4 * resolution.across_ray
-    )
+    coarse = _coarse_resolution(echo)
     candidates = find_lines(looked.peaks, coarse)
     plain = prepare(range_profiles(echo))
     tapered = prepare(range_profiles(echo, weights=_taper_weights(echo)))
@@ -129,8 +128,43 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     return tuple(sorted(lines, key=lambda line: -line.level))
 
 
-def _lies_on(point: Float[np.ndarray, " 3"], line: FittedLine, resolution: Resolution) -> bool:
+def loose_peaks(
+    echo: Echo, looked: Survey, lines: Sequence[FittedLine]
+) -> Float[np.ndarray, "peaks 3"]:
+    """Return the survey's peaks that lie neither on a wall nor behind one, strongest first."""
+    resolution = _coarse_resolution(echo)
+    return np.array(
+        [
+            peak
+            for peak in looked.peaks
+            if not any(_lies_on(peak, line, resolution, margin=4.0) for line in lines)
+            and not any(_hides(line, peak) for line in lines)
+        ]
+    ).reshape(-1, 3)
+
+
+def _coarse_resolution(echo: Echo) -> Resolution:
+    """Return the resolution of the survey, which its taper widens by about 1.4."""
+    fine = echo_resolution(echo)
+    return Resolution(along_ray=1.4 * fine.along_ray, across_ray=1.4 * fine.across_ray)
+
+
+def _hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
+    far = float(np.linalg.norm(point))
+    hit = crossing(np.zeros(3), point / far, line.start, line.end)
+    return hit is not None and hit[0] < far
+
+
+def _lies_on(
+    point: Float[np.ndarray, " 3"],
+    line: FittedLine,
+    resolution: Resolution,
+    *,
+    margin: float = 0.0,
+) -> bool:
+    """Tell whether a point is on a segment, within two cells across and a margin along it."""
     normal = np.array([line.direction[1], -line.direction[0], 0.0])
     beside = abs(float((point - line.middle) @ normal))
     along = abs(float((point - line.middle) @ line.direction))
-    return beside < 2 * float(resolution.cell(point, normal)) and along < 0.5 * line.length
+    reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
+    return beside < 2 * float(resolution.cell(point, normal)) and along < reach

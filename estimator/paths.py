@@ -16,8 +16,10 @@ from estimator.measurement import Uplink
 from estimator.spherical_wave_fit import SphericalWave, fit_spherical_wave, wave_field
 
 MOST_PATHS = 4
-LEAST_SHARE = 0.02
-"""Share of the pilot's energy below which a wave is not looked at. [-]."""
+LEAST_SHARE = 0.05
+"""Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
+FALSE_ALARM = 1e-6
+"""Probability that noise alone gives a wave somewhere in the map. [-]"""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the robust covariance is an estimate
 from few blocks itself, and a rough mirror bends the wavefront in ways it only samples."""
@@ -31,7 +33,7 @@ class Path:
 
     wave: SphericalWave  # fitted with the curvature of its delay
     free: SphericalWave  # fitted with a curvature of its own
-    share: float  # of the pilot's energy [-]
+    share: float  # of the pilot's energy, less the noise [-]
     unambiguous: float  # longest path that the frequency step tells apart [m]
 
     @property
@@ -65,7 +67,11 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
     -------
     The waves, strongest first; each holds at least :data:`LEAST_SHARE` of the energy.
     """
-    energy = float(np.sum(np.abs(uplink.samples) ** 2))
+    noise = noise_variance(uplink)
+    energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
+    # A matched filter's output of noise is exponential: this is passed by chance in one map
+    # of a million.
+    least = noise * float(np.log(first_map.values.size / FALSE_ALARM))
     step = float(uplink.frequencies[1] - uplink.frequencies[0])
     paths: list[Path] = []
     left, this_map = uplink, first_map
@@ -74,6 +80,8 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
             int(np.argmax(np.abs(this_map.values))), this_map.values.shape
         )
         aoa, length = float(this_map.aoa[row]), float(this_map.path_length[column])
+        if abs(this_map.values[row, column]) ** 2 * left.samples.size < least:
+            break
         try:
             wave = fit_spherical_wave(left, aoa=aoa, path_length=length)
             start = search_curvature(left, aoa=wave.aoa, path_length=wave.path_length)
@@ -84,7 +92,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
             break  # no maximum near the peak: a ridge, not a wave
         share = free.explained * float(np.sum(np.abs(left.samples) ** 2)) / energy
         if share < LEAST_SHARE:
-            break
+            break  # speckle
         paths.append(Path(wave=wave, free=free, share=share, unambiguous=speed_of_light / step))
         # With its own curvature, whatever it is, less of the wave is left behind.
         field = wave_field(
@@ -95,9 +103,19 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
             radius=free.radius,
         )
         left = replace(left, samples=left.samples - free.gain * field)
-        if float(np.sum(np.abs(left.samples) ** 2)) < LEAST_SHARE * energy:
+        remaining = float(np.sum(np.abs(left.samples) ** 2)) - noise * left.samples.size
+        if remaining < LEAST_SHARE * energy:
             break
         this_map = angle_range_map(
             left, aoa=first_map.aoa, path_length=first_map.path_length, centre=np.zeros(3)
         )
     return tuple(paths)
+
+
+def noise_variance(uplink: Uplink) -> float:
+    """Estimate the noise in each sample from the delays at which nothing arrives.
+
+    The median over all delays is blind to the few that hold signal.
+    """
+    delays = np.abs(np.fft.ifft(uplink.samples, axis=1)) ** 2
+    return float(np.median(delays)) / float(np.log(2)) * uplink.frequencies.size

@@ -20,7 +20,7 @@ from scipy.constants import speed_of_light
 from estimator.measurement import Uplink
 
 ITERATIONS = 30
-CONVERGED = 1e-4
+CONVERGED = 1e-2
 """Step at which the iteration ends, in standard deviations of the parameters. [-]."""
 
 BLOCKS = 16

@@ -16,6 +16,8 @@ AGREE = float(chi2.ppf(0.999, df=2))
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
 END_DEVIATIONS = 3.0
+LOOSE_PEAKS = 12
+"""Strongest loose peaks between which an unseen wall is suspected."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +35,7 @@ def decide(
     *,
     cell: float,
     imaged: bool,
+    loose: Float[np.ndarray, "peaks 3"],
 ) -> UserEstimate:
     """Locate a user in the array's frame.
 
@@ -48,18 +51,23 @@ def decide(
         How well the image tells where a wall ends, as an angle. [rad]
     imaged
         Whether there was an echo at all: without, nothing is known of mirrors.
+    loose
+        Peaks of the image that lie on no wall, strongest first. [m]
 
     Returns
     -------
     ``found`` with the position that the paths agree on; ``ambiguous`` if strong paths
-    contradict each other, or the reflection is at a wall's very end, with the alternatives;
+    contradict each other, the reflection is at a wall's very end, or a wall that is too
+    smooth to be seen may be in the way, with the alternatives;
     ``not_found`` with the reason.
     """
     if not paths:
         return UserEstimate(name=name, status="not_found", reason="no wave stands out of the pilot")
     specular = [path for path in paths if path.specular]
-    if not specular or specular[0].share < RIVAL * paths[0].share:
-        return UserEstimate(name=name, status="not_found", reason=_why_none(paths[0]))
+    scattered = [path for path in paths if not path.specular]
+    if sum(path.share for path in scattered) > sum(path.share for path in specular):
+        strongest = max(scattered, key=lambda path: path.share)
+        return UserEstimate(name=name, status="not_found", reason=_why_none(strongest))
     hypotheses = [
         Hypothesis(
             path=path,
@@ -82,10 +90,16 @@ def decide(
     if rivals:
         reason = "paths of like strength end at different places"
         return replace(answer, status="ambiguous", reason=reason, alternatives=tuple(rivals))
-    strongest = groups[best][0]
-    other = _past_the_end(name, strongest, walls, cell)
+    other = _past_the_end(name, groups[best][0], walls, cell)
     if other is not None:
         reason = "the path meets a wall at its very end: it may pass beside it"
+        return replace(answer, status="ambiguous", reason=reason, alternatives=(other,))
+    other = _over_an_unseen_wall(name, groups[best][0], loose)
+    if other is not None:
+        reason = (
+            "the straight way passes between two points that may be the ends of a wall too smooth "
+            "to be seen; over such a wall the user is elsewhere"
+        )
         return replace(answer, status="ambiguous", reason=reason, alternatives=(other,))
     if not imaged:
         reason = "no echo was measured, so mirrors are unknown; this is the place without any"
@@ -134,15 +148,26 @@ def _joined(name: str, group: Sequence[Hypothesis]) -> UserEstimate:
     covariance[:2, :2] = np.linalg.inv(information)
     position: Float[np.ndarray, " 3"] = np.append(covariance[:2, :2] @ weighted, 0.0)
     strongest = group[0]
-    return UserEstimate(
-        name=name,
+    return replace(
+        _placed(name, strongest.path, strongest.projection),
         status="found",
         position=position,
         covariance=covariance,
-        bounces=len(strongest.projection.walls),
-        aoa=strongest.path.wave.aoa,
-        path_length=strongest.path.wave.path_length,
         path=np.vstack([strongest.projection.path[:-1], position]),
+    )
+
+
+def _placed(name: str, path: Path, projection: Projection) -> UserEstimate:
+    """Tell where one path ends, as one of several answers."""
+    return UserEstimate(
+        name=name,
+        status="ambiguous",
+        position=projection.position,
+        covariance=projection.covariance,
+        bounces=len(projection.walls),
+        aoa=path.wave.aoa,
+        path_length=path.wave.path_length,
+        path=projection.path,
     )
 
 
@@ -157,16 +182,7 @@ def _past_the_end(
         if turned.walls != met:
             chain = [walls[index] for index in turned.walls]
             place = project(wave.aoa, wave.path_length, _endless(chain), covariance=wave.covariance)
-            return UserEstimate(
-                name=name,
-                status="ambiguous",
-                position=place.position,
-                covariance=place.covariance,
-                bounces=len(place.walls),
-                aoa=wave.aoa,
-                path_length=wave.path_length,
-                path=place.path,
-            )
+            return _placed(name, hypothesis.path, place)
     return None
 
 
@@ -180,3 +196,22 @@ def _endless(walls: Sequence[Wall]) -> list[Wall]:
         )
         for wall in walls
     ]
+
+
+def _over_an_unseen_wall(
+    name: str, hypothesis: Hypothesis, loose: Float[np.ndarray, "peaks 3"]
+) -> UserEstimate | None:
+    """Return the user's place over a smooth wall between two loose points, if one is in the way.
+
+    A smooth wall echoes from its ends alone, and reflects all the better.
+    """
+    if hypothesis.projection.walls:
+        return None
+    wave = hypothesis.path.wave
+    points = loose[:LOOSE_PEAKS]
+    for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
+        wall = Wall(start=points[first], end=points[second], covariance=np.zeros((2, 2)))
+        place = project(wave.aoa, wave.path_length, [wall], covariance=wave.covariance)
+        if place.walls:
+            return _placed(name, hypothesis.path, place)
+    return None

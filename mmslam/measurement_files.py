@@ -1,7 +1,8 @@
 """Measurement files from a simulation, or from somebody else's data."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from estimator.estimate import Progress
 from estimator.measurement import Measurement
@@ -11,14 +12,11 @@ from mmslam.import_npz import import_npz
 from mmslam.interruption import interruptions_held
 from scenes.scenario import Scenario
 
-if TYPE_CHECKING:
-    from simulator.simulation import Simulation
-
 
 def simulate_interruptibly(
     scenario: Scenario, *, seed: int, progress: Progress | None = None
-) -> "Simulation":
-    """Simulate a scenario; Ctrl-C takes effect between two steps of it."""
+) -> tuple[Measurement, xr.Dataset]:
+    """Simulate a measurement and the truth behind it; Ctrl-C takes effect between two steps."""
     with interruptions_held() as let_through:
         from simulator.simulation import simulate  # Sionna's import takes seconds
 
@@ -27,7 +25,8 @@ def simulate_interruptibly(
             if progress is not None:
                 progress(stage, done, total)
 
-        return simulate(scenario, seed=seed, progress=step)
+        simulation = simulate(scenario, seed=seed, progress=step)
+    return simulation.measurement, simulation.truth
 
 
 def simulate_to_file(
@@ -35,9 +34,9 @@ def simulate_to_file(
 ) -> Measurement:
     """Simulate a scenario and write the measurement and its truth to one store."""
     with output.replacing(path, output.refuse_foreign_store) as new:
-        simulation = simulate_interruptibly(scenario, seed=seed, progress=progress)
-        write_measurement(new, simulation.measurement, truth=simulation.truth)
-    return simulation.measurement
+        measurement, truth = simulate_interruptibly(scenario, seed=seed, progress=progress)
+        write_measurement(new, measurement, truth=truth)
+    return measurement
 
 
 def import_to_file(source: Path, *, uplink: str | None, path: Path) -> Measurement:

@@ -44,13 +44,12 @@ def run_scenario(
     with output.replacing(folder, output.refuse_foreign_results) as new:
         new.mkdir()
         started = time.perf_counter()
-        simulation = simulate_interruptibly(scenario, seed=seed, progress=progress)
+        measurement, true_scene = simulate_interruptibly(scenario, seed=seed, progress=progress)
         timings = {"simulate": time.perf_counter() - started}
-        measurement = simulation.measurement
         started = time.perf_counter()
-        write_measurement(new / output.MEASUREMENT, measurement, truth=simulation.truth)
+        write_measurement(new / output.MEASUREMENT, measurement, truth=true_scene)
         timings["write_measurement"] = time.perf_counter() - started
-        truth = truth_from_dataset(simulation.truth)
+        truth = truth_from_dataset(true_scene)
         estimate = locate(measurement, progress=progress)
         result = _write_results(new, measurement, estimate, truth, timings, scenario)
     return Outcome(folder=folder, result=result)

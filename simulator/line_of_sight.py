@@ -14,8 +14,9 @@ def in_line_of_sight(
     """Tell which elements see the user, by Sionna RT's deterministic path solver."""
     isotropic = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     scene.tx_array = scene.rx_array = isotropic
-    scene.add(rt.Transmitter("user", position=user.tolist()))
-    names = [f"element-{index}" for index in range(len(elements))]
+    # No object's name holds a slash, so that these can never be one's.
+    scene.add(rt.Transmitter("/user", position=user.tolist()))
+    names = [f"/element-{index}" for index in range(len(elements))]
     for name, element in zip(names, elements, strict=True):
         scene.add(rt.Receiver(name, position=element.tolist()))
     paths = rt.PathSolver(deterministic=True)(
@@ -23,7 +24,7 @@ def in_line_of_sight(
     )
     # [receiver, antenna, transmitter, antenna, path]
     seen = np.asarray(paths.valid.numpy(), dtype=bool).reshape(len(elements), -1).any(axis=-1)
-    for name in ("user", *names):
+    for name in ("/user", *names):
         scene.remove(name)
     return np.asarray(seen)
 

@@ -59,6 +59,6 @@ def facet_ports(
     """Place equal antennas at positions and trace which facets each sees."""
     return Ports(
         positions=positions,
-        pattern=antenna_pattern(antenna, scene.scenario.aim(antenna, positions[0])),
+        pattern=antenna_pattern(antenna, scene.scenario.aim(antenna, positions.mean(axis=0))),
         visible=facets_visible(scene.rays, facets, positions),
     )

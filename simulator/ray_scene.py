@@ -31,7 +31,8 @@ def build_scene(surfaces: Sequence[Surface]) -> rt.Scene:
     """Build a Sionna RT scene; each surface becomes an object of its name."""
     scene = rt.Scene()
     # Sionna's own 'metal' ends at 100 GHz; its constants do for a conductor at any frequency.
-    metal = rt.RadioMaterial("conductor", relative_permittivity=1.0, conductivity=1e7)
+    # Its name is in the objects' name space, and none of theirs holds a slash.
+    metal = rt.RadioMaterial("/conductor", relative_permittivity=1.0, conductivity=1e7)
     objects = [
         rt.SceneObject(mi_mesh=_mesh(surface), name=surface.name, radio_material=metal)
         for surface in surfaces

@@ -59,7 +59,7 @@ def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freq
     directions = towards / distances[:, None]
     gains = field_gain(user.antenna, scenario.aim(user.antenna, user.position), directions)
     gains = gains * field_gain(
-        station.antenna, scenario.aim(station.antenna, elements[0]), -directions
+        station.antenna, scenario.aim(station.antenna, elements.mean(axis=0)), -directions
     )
     seen = in_line_of_sight(scene.rays, user.position, elements)
     wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)

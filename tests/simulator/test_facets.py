@@ -11,7 +11,7 @@ from simulator.facets import joined, profile_surface, surface_facets
 def surface(
     vertices: list[list[float]], cells: list[list[int]], *, closed: bool = False
 ) -> Surface:
-    points: Float[np.ndarray, "vertices 3"] = np.array(vertices)
+    points: Float[np.ndarray, "vertices 3"] = np.array(vertices, dtype=np.float64)
     indices: Int[np.ndarray, "cells corners"] = np.array(cells)
     return Surface(
         name="body",
