@@ -80,6 +80,7 @@ class Estimate:
     targets: tuple[Target, ...] = ()
     raw_image: Image | None = None
     corrected_image: Image | None = None
-    maps: tuple[AngleRangeMap, ...] = ()
+    maps: tuple[AngleRangeMap, ...] = ()  # one for each user
+    close_ups: tuple[AngleRangeMap, ...] = ()  # the same, finely around each map's answer or peak
     notes: tuple[str, ...] = ()  # what was assumed or could not be done
     timings: dict[str, float] = field(default_factory=dict)  # stage → duration [s]

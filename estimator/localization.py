@@ -6,11 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 
 from estimator.angle_range_map import angle_range_map, default_angles, default_path_lengths
 from estimator.array_frame import ArrayFrame, array_frame
 from estimator.backprojection import focus, prepare
-from estimator.estimate import Estimate, Image, Mirror, Progress, UserEstimate
+from estimator.estimate import (
+    AngleRangeMap,
+    Estimate,
+    Image,
+    Mirror,
+    Progress,
+    UserEstimate,
+)
 from estimator.ghost_correction import corrected_image
 from estimator.measurement import Echo, Measurement, Uplink, frequency_step
 from estimator.mirror_fit import FittedLine
@@ -31,6 +39,10 @@ from estimator.user_decision import decide
 
 PIXELS = 2_000_000
 """Most pixels of an image that is shown; its spacing grows beyond."""
+CLOSE_UP = 80
+"""Samples of the close-up to either side."""
+CLOSE_UP_SAMPLES = 8
+"""Samples of the close-up for each resolution cell λ/D or c/B."""
 MARGIN = 0.05
 """What an image shows around the outermost things in it. [m]."""
 
@@ -88,7 +100,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         timings["mirrors"] = time.perf_counter() - started
     tell("estimate", 1, steps)
 
-    users, maps = [], []
+    users, maps, close_ups = [], [], []
     for index, uplink in enumerate(uplinks):
         started = time.perf_counter()
         local = replace(uplink, positions=frame.to_local(uplink.positions))
@@ -108,6 +120,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             loose=loose,
         )
         users.append(_in_world(found, frame))
+        close_ups.append(_close_up(local, looked, found))
         timings[f"user {uplink.user}"] = time.perf_counter() - started
         tell("estimate", 2 + index, steps)
 
@@ -126,8 +139,29 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         raw_image=raw,
         corrected_image=corrected,
         maps=tuple(maps),
+        close_ups=tuple(close_ups),
         notes=tuple(notes),
         timings=timings,
+    )
+
+
+def _close_up(uplink: Uplink, looked: AngleRangeMap, found: UserEstimate) -> AngleRangeMap:
+    """Map the surroundings of the answer, or of the map's peak without one, finely."""
+    if found.aoa is not None and found.path_length is not None:
+        aoa, length = found.aoa, found.path_length
+    else:
+        peak = np.unravel_index(int(np.argmax(np.abs(looked.values))), looked.values.shape)
+        aoa, length = float(looked.aoa[peak[0]]), float(looked.path_length[peak[1]])
+    steps = np.arange(-CLOSE_UP, CLOSE_UP + 1) / CLOSE_UP_SAMPLES
+    beam = speed_of_light / float(uplink.frequencies.mean()) / float(np.ptp(uplink.positions[:, 0]))
+    cosines = np.cos(aoa) - beam * steps
+    lengths = length + speed_of_light / float(np.ptp(uplink.frequencies)) * steps
+    lengths = lengths[(lengths > looked.path_length[0]) & (lengths < looked.path_length[-1])]
+    return angle_range_map(
+        uplink,
+        aoa=np.arccos(cosines[np.abs(cosines) < 1]),
+        path_length=lengths,
+        centre=np.zeros(3),
     )
 
 

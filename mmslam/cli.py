@@ -251,4 +251,5 @@ def _print_written(path: Path, measurement: Any, as_json: bool) -> None:
     if as_json:
         _print_json({"file": str(path), **summary})
     else:
-        typer.echo(f"{path}: " + ", ".join(f"{key} {value}" for key, value in summary.items()))
+        told = [f"{key} {value}" for key, value in summary.items() if value is not None]
+        typer.echo(f"{path}: {', '.join(told)}")

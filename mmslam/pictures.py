@@ -140,7 +140,11 @@ def localization_figure(
             figures.draw_close_up(
                 figure.add_subplot(rows[row]), user, truth.user_position.get(user.name)
             )
-    silent = [f"{user.name}: {user.status}" for user in estimate.users if user.position is None]
+    silent = [
+        f"{user.name}: {user.status.replace('_', ' ')}"
+        for user in estimate.users
+        if user.position is None
+    ]
     if silent:
         ax.text(0.02, 0.98, "\n".join(silent), transform=ax.transAxes, va="top", color=figures.USER)
     figure.legend(

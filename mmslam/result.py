@@ -114,7 +114,7 @@ def dimensions(measurement: Measurement) -> int:
         [part.positions for part in (measurement.echo, *measurement.uplinks) if part is not None]
     )
     sizes = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-    return 2 if sizes[1] <= _FLATNESS * sizes[0] else 3
+    return 2 if len(sizes) < 2 or sizes[1] <= _FLATNESS * sizes[0] else 3
 
 
 def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:

@@ -54,13 +54,13 @@ def _user(user: Mapping[str, Any]) -> str:
     line = f"{user['name']}: {status} at {_point(user['estimate_m'])}"
     if user["covariance_m2"] is not None:
         spread = sqrt(sum(user["covariance_m2"][axis][axis] for axis in range(3)))
-        line += f" ± {1e3 * spread:.2f} mm"
+        line += f" ± {1e3 * spread:.3f} mm"
     if user["aoa_deg"] is not None:
         line += f", angle {user['aoa_deg']:.3f}°, path {user['range_m']:.4f} m"
     if user["bounces"] is not None:
         line += f", {user['bounces']} bounce{'' if user['bounces'] == 1 else 's'}"
     if user["error_m"] is not None:
-        line += f"; {1e3 * user['error_m']:.2f} mm from the truth"
+        line += f"; {1e3 * user['error_m']:.3f} mm from the truth"
     return line + (f" ({user['reason']})" if user["reason"] else "")
 
 

@@ -304,7 +304,7 @@ def draw_close_up(
     if truth is not None:
         ax.plot(0, 0, "o", mfc="none", mec=INK, ms=12, mew=1.4, label="truth")
         error = 1e3 * float(np.linalg.norm(user.position - truth))
-        ax.set_title(f"{user.name}: {error:.2f} mm off", fontsize=10)
+        ax.set_title(f"{user.name}: {error:.3f} mm off", fontsize=10)
     else:
         ax.set_title(f"{user.name}: truth not known", fontsize=10)
     reach = max(reach, 0.01)
@@ -313,7 +313,7 @@ def draw_close_up(
     ax.set_xlabel(f"x from the {about} [mm]")
     ax.set_ylabel("y [mm]")
     for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(MaxNLocator(4))
+        axis.set_major_locator(MaxNLocator(3))
     return ax
 
 

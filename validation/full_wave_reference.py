@@ -31,6 +31,8 @@ BEAM_NODES = 4
 """Frequencies that the beam is sampled at: exp(kb(cos ψ − 1)) varies by e^{±0.4} over the
 band where it is not yet small. [-]"""
 
+COMPARED = ("echo", "uplink_isotropic", "uplink_beam")
+
 LEAST_CORRELATION = 0.99
 MOST_LEVEL_DB = 2.0
 """Physical optics reaches 0.993 and 1.1 dB (echo), 0.996…0.999 and 0.5 dB (uplinks) at
@@ -120,12 +122,13 @@ def read_reference(path: Path) -> dict[str, np.ndarray]:
     Raises
     ------
     MeasurementError
-        If it is no such file, or an array that is needed is missing.
+        If it is no such file, an array that is needed is missing, or one has another shape.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # Opened here: NumPy leaves the file of a damaged archive open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    except (OSError, ValueError, AttributeError) as error:
+    except Exception as error:  # NumPy, zip and zlib fail in many ways on a foreign file
         raise MeasurementError(f"{path}: not an .npz of plain arrays ({error})") from error
     needed = ["wall_profile", "aperture_position", "frequency"]
     if any(name.startswith("uplink") for name in arrays):
@@ -133,6 +136,18 @@ def read_reference(path: Path) -> dict[str, np.ndarray]:
     missing = [name for name in needed if name not in arrays]
     if missing:
         raise MeasurementError(f"{path}: {', '.join(missing)} missing; see this module's layout")
+    compared = [name for name in COMPARED if name in arrays]
+    if not compared:
+        raise MeasurementError(
+            f"{path}: no {', '.join(COMPARED[:-1])} or {COMPARED[-1]}; nothing to compare"
+        )
+    shape = (len(arrays["aperture_position"]), len(arrays["frequency"]))
+    for name in compared:
+        if arrays[name].shape != shape:
+            raise MeasurementError(
+                f"{path}: {name!r} has shape {arrays[name].shape}; with these positions and "
+                f"frequencies it must be {shape}"
+            )
     return arrays
 
 

@@ -53,20 +53,17 @@ def test_our_own_results_are_replaced(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_a_failure_leaves_everything_as_it_was(tmp_path: Path, error: type[BaseException]) -> None:
+    def fail(folder: Path) -> None:
+        with replacing(folder, refuse_foreign_results) as new:
+            fill(new)
+            raise error
+
     fill(tmp_path / "out", "old")
-    with (  # noqa: PT012, what fails is the block
-        pytest.raises(error),
-        replacing(tmp_path / "out", refuse_foreign_results) as new,
-    ):
-        fill(new)
-        raise error
+    with pytest.raises(error):
+        fail(tmp_path / "out")
     assert (tmp_path / "out" / output.REPORT).read_text() == "old"
-    with (  # noqa: PT012
-        pytest.raises(error),
-        replacing(tmp_path / "x" / "y", refuse_foreign_results) as new,
-    ):
-        fill(new)
-        raise error
+    with pytest.raises(error):
+        fail(tmp_path / "x" / "y")
     assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
 
 
@@ -183,14 +180,16 @@ def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path: Path) -> None:
     # A limit on the size of a file fails as a full disk does: in the middle of a write.
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     kept = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
-        with (  # noqa: PT012
-            pytest.raises(OutputError, match="size limit"),
-            replacing(tmp_path / "out", refuse_foreign_results) as new,
-        ):
+
+    def write_too_much() -> None:
+        with replacing(tmp_path / "out", refuse_foreign_results) as new:
             new.mkdir()
             resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
             (new / "big").write_bytes(bytes(8192))
+
+    try:
+        with pytest.raises(OutputError, match="size limit"):
+            write_too_much()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, kept)
@@ -201,21 +200,23 @@ def test_a_writer_that_is_late_leaves_nothing_behind_either(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As Zarr's threads do: they make the folder anew after it was removed, twice here.
+    stores: list[Path] = []
     late: list[Path] = []
 
     def write_once_more(_: float) -> None:
         if len(late) < 2:
-            late.append(store)
-            store.mkdir(parents=True)
-            (store / "chunk").write_text("late")
+            late.extend(stores)
+            stores[0].mkdir(parents=True)
+            (stores[0] / "chunk").write_text("late")
+
+    def fail() -> None:
+        with replacing(tmp_path / "a" / "out", refuse_foreign_results) as new:
+            stores.append(new / "measurement.zarr")
+            raise ValueError("full")
 
     monkeypatch.setattr(time, "sleep", write_once_more)
-    with (  # noqa: PT012
-        pytest.raises(ValueError, match="full"),
-        replacing(tmp_path / "a" / "out", refuse_foreign_results) as new,
-    ):
-        store = new / "measurement.zarr"
-        raise ValueError("full")
+    with pytest.raises(ValueError, match="full"):
+        fail()
     assert len(late) == 2
     assert everything_below(tmp_path) == []
 

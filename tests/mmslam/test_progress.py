@@ -48,10 +48,14 @@ def test_an_interrupted_stage_leaves_no_bar_and_no_thread_behind(
 
     monkeypatch.setattr(progress, "PATIENCE", 0.05)
     before = threading.active_count()
-    console = Console(file=io.StringIO(), force_terminal=True)
-    with pytest.raises(KeyboardInterrupt), StageProgress(console) as report:  # noqa: PT012
-        report("echo", 0, 2)
-        time.sleep(0.2)
-        raise KeyboardInterrupt
+
+    def work() -> None:
+        with StageProgress(Console(file=io.StringIO(), force_terminal=True)) as report:
+            report("echo", 0, 2)
+            time.sleep(0.2)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
     time.sleep(0.1)
     assert threading.active_count() == before

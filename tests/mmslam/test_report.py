@@ -30,7 +30,7 @@ def test_the_page_needs_no_other_file_and_no_network(page: str) -> None:
 
 
 def test_the_page_tells_users_mirrors_notes_and_the_scenario(page: str) -> None:
-    assert "5.00 mm off" in page
+    assert "5.000 mm off" in page
     assert "door" in page
     assert "z = 0 and y &gt; 0 are assumed" in page
     assert "correlation_mm" in page

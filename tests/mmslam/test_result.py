@@ -83,6 +83,12 @@ def test_a_planar_aperture_answers_in_three_dimensions(measurement: Measurement)
     assert dimensions(replace(measurement, echo=replace(measurement.echo, positions=raised))) == 3
 
 
+def test_a_single_element_answers_in_a_plane_like_a_line(measurement: Measurement) -> None:
+    (uplink,) = measurement.uplinks
+    single = replace(uplink, samples=uplink.samples[:1], positions=uplink.positions[:1])
+    assert dimensions(Measurement(echo=None, uplinks=(single,))) == 2
+
+
 def test_an_array_that_points_anywhere_still_answers_in_a_plane(measurement: Measurement) -> None:
     angle = 0.7
     turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0]])
@@ -107,7 +113,7 @@ def test_the_summary_says_who_is_where_and_how_far_off(
     folder = Path("out")
     text = "\n".join(summary_lines(result_document(measurement, estimate, truth), folder))
     assert "ann: found at (1.0030, 0.7960, 0.0000) m" in text
-    assert "5.00 mm from the truth" in text
+    assert "5.000 mm from the truth" in text
     assert "from 'door'" in text
     lost = "\n".join(summary_lines(result_document(measurement, nothing_found, truth), folder))
     assert "ann: not found (no peak above the noise)" in lost

@@ -140,22 +140,17 @@ def test_with_noise_a_silent_echo_has_the_noise_of_the_quietest_array() -> None:
 
 
 def test_a_user_that_nothing_reaches_is_left_out_or_is_noise() -> None:
-    shade = {"kind": "plate", "material": "absorber", "centre_m": [0.25, 0.15], "length_m": 0.48}
-    tables = {"objects": {"wall": WALL, "shade": shade}, "users": {"a": {"position_m": [0.3, 0.1]}}}
-    silent = measured(scenario(**tables))
-    assert silent.echo is not None
-    assert silent.uplinks == () or np.any(silent.uplinks[0].samples)
-    blocked = {
-        **tables,
+    shade = {"kind": "plate", "material": "absorber", "length_m": 0.48}
+    tables = {
         "objects": {
             "wall": {**WALL, "centre_m": [-0.3, 0.4]},
-            "shade": {**shade, "centre_m": [0.3, 0.2], "angle_deg": 90.0},
-            "lid": {**shade, "centre_m": [0.3, 0.45]},
+            "beside": {**shade, "centre_m": [0.3, 0.2], "angle_deg": 90.0},
+            "above": {**shade, "centre_m": [0.3, 0.45]},
         },
         "users": {"a": {"position_m": [0.5, 0.3]}},
     }
-    assert measured(scenario(**blocked)).uplinks == ()
-    noisy = measured(scenario(**blocked, noise={"snr_db": 20.0}))
+    assert measured(scenario(**tables)).uplinks == ()
+    noisy = measured(scenario(**tables, noise={"snr_db": 20.0}))
     assert noisy.echo is not None
     level = 0.01 * np.mean(np.abs(noisy.echo.samples) ** 2)
     power = np.mean(np.abs(noisy.uplinks[0].samples) ** 2)
@@ -177,23 +172,20 @@ def test_where_nothing_is_received_there_is_no_measurement(tables: dict[str, Any
 
 
 def test_over_a_smooth_mirror_the_pilot_comes_from_the_users_image() -> None:
-    # The beam lights the wall's middle only, so that the edges (3 sigma off) hardly scatter.
     pilot = samples(measured(scenario(objects={"wall": WALL}, users={"a": HIDDEN})))[1]
-    station = scenario(objects={"wall": WALL}).base_station.element_positions
+    elements = scenario(objects={"wall": WALL}).base_station.element_positions
     image = np.array([0.0, 0.9, 0.0])  # of (0.5, 0.4) in the line y = x + 0.4
-    lengths = np.linalg.norm(image - station, axis=-1)
-    frequencies = np.linspace(220e9, 295e9, 101)
-    wavelengths = speed_of_light / frequencies
-    # The ray to an element leaves the user off the beam's axis as the image sees it.
-    off_axis = np.arctan2(station[:, 0], 0.9)
-    expected = -np.exp(-0.5 * (off_axis / 0.1) ** 2)[:, None] * wavelengths / (4 * np.pi)
-    expected = expected / lengths[:, None] * np.exp(-2j * np.pi * lengths[:, None] / wavelengths)
-    # A Gaussian beam's curvature moves the next order of stationary phase: L/(k·(σr)²·cos²θ)
-    # with r = 0.5 m, σ = 0.1: 0.9·0.4/0.9/(4600·0.0025) = 3.5 % in quadrature, 1e-3 in magnitude.
+    lengths = np.linalg.norm(image - elements, axis=-1)[:, None]
+    wavelengths = speed_of_light / np.linspace(220e9, 295e9, 101)
+    # The ray to an element leaves the user off the beam's axis as it does its image.
+    gain = np.exp(-0.5 * (np.arctan2(elements[:, 0], 0.9) / 0.1) ** 2)[:, None]
+    expected = -gain * wavelengths / (4 * np.pi * lengths)
+    expected = expected * np.exp(-2j * np.pi * lengths / wavelengths)
+    # Both ends of the wall are 7 cm off the beam's axis, 1.4 standard widths: 0.37 of its field.
+    # Either adds its Fresnel ripple, 1/(√2·π·v) with v = 0.07·√(2(1/0.5 + 1/0.4)/λ) = 5.9: 1.4 %.
+    # The width of the beam itself turns the phase by 1/(2k·0.5·0.1²·(1 + 0.5/0.4)) = 0.9 %.
     error = np.linalg.norm(pilot - expected) / np.linalg.norm(expected)
-    assert error <= 0.05
-    delays = np.angle(np.mean(pilot * expected.conj(), axis=1))
-    assert np.abs(delays).max() <= 0.05
+    assert error <= 2 * 0.014 + 0.009
 
 
 def test_the_echo_of_a_symmetric_scene_is_symmetric_whatever_the_antenna() -> None:

@@ -131,7 +131,7 @@ def test_a_close_up_counts_millimetres_from_the_truth(ax: Axes) -> None:
     figures.draw_close_up(ax, user, np.array([1.0, 0.8, 0.0]))
     drawn = np.asarray(ax.lines[-2].get_xydata(), dtype=np.float64)
     np.testing.assert_allclose(drawn, [[0.3, 0.4]], atol=1e-9)
-    assert ax.get_title() == "ann: 0.50 mm off"
+    assert ax.get_title() == "ann: 0.500 mm off"
     # 0.2 mm and 0.1 mm of deviation: full axes 0.4 mm by 0.2 mm, the longer along x.
     inner = ax.patches[-1]
     assert isinstance(inner, Ellipse)
