@@ -1,6 +1,6 @@
 """One interface to the methods that form an image."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -12,6 +12,7 @@ from estimator.pixel_grid import PixelGrid
 from estimator.range_migration import range_migration
 
 
+@runtime_checkable
 class ImageFormer(Protocol):
     """A method that forms a complex image of an echo on a grid."""
 

@@ -97,9 +97,14 @@ def write_measurement(
         if truth is not None:
             _write_group(aside / "new", truth, group="truth")
         # A non-empty folder cannot be replaced in one step: move the old store out first.
-        if path.exists():
-            path.rename(aside / "old")
-        (aside / "new").rename(path)
+        try:
+            if path.exists():
+                path.rename(aside / "old")
+            (aside / "new").rename(path)
+        except BaseException:
+            if (aside / "old").exists():
+                (aside / "old").rename(path)
+            raise
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 

@@ -128,7 +128,7 @@ def facet_problems(
             f"objects.{name}: needs {counts[name]:.3g} facets at a spacing of "
             f"{spacing * 1e3:.3g} mm, all objects {needed / 2**30:.3g} GiB, more than "
             f"{MOST_BYTES >> 30} GiB; make it smaller, lower radio.stop_ghz, or raise "
-            f"objects.{name}.roughness.correlation_mm"
+            f"objects.{name}.roughness.correlation_mm (or set roughness.rms_mm = 0: smooth)"
         )
     return found
 

@@ -58,7 +58,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     data.setdefault("name", source.name.removesuffix(".toml"))
     _override(data, overrides)
     if folder is not None:
-        _resolve_mesh_files(data, folder)
+        _resolve_files(data, folder)
     try:
         return parse_scenario(data)
     except ScenarioError as error:
@@ -173,11 +173,13 @@ def _literal(text: str) -> object:
     return values["value"] if list(values) == ["value"] else text
 
 
-def _resolve_mesh_files(data: dict[str, Any], folder: Path) -> None:
-    """Make the mesh files' paths relative to the scenario's file absolute."""
+def _resolve_files(data: dict[str, Any], folder: Path) -> None:
+    """Make paths relative to the scenario's file absolute: meshes, tables of permittivity."""
     for body in _group(data, "objects").values():
-        if isinstance(body, dict) and isinstance(body.get("file"), str) and body["file"]:
-            body["file"] = str((folder / body["file"]).resolve())
+        tables = [body, body.get("material")] if isinstance(body, dict) else []
+        for table in tables:
+            if isinstance(table, dict) and isinstance(table.get("file"), str) and table["file"]:
+                table["file"] = str((folder / table["file"]).resolve())
 
 
 def _plain(table: Mapping[str, Any], *, flat: bool) -> dict[str, object]:

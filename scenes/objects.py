@@ -1,33 +1,21 @@
 """Objects of a scenario: plates, cylinders, boxes and mesh files, with pose and roughness."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from scenes.directions import left_of, right_of, unit_vector
+from scenes.materials import MATERIALS, Material, usual_texture
 from scenes.quantities import Angle, Checked, Position, Size
 from scenes.rough_surface import Spectrum
-from scenes.scenario_error import did_you_mean
-
-MATERIALS = ("metal", "absorber")
-"""Materials that a scenario may name."""
 
 LARGEST_RELATIVE_RMS = 0.1
 """Largest rms height over the object's smallest size: at 0.1 four standard deviations still
 leave a body. [-]"""
-
-
-def _material(value: str) -> str:
-    if value not in MATERIALS:
-        raise PydanticCustomError(
-            "material",
-            "unknown material{hint}; use one of {known}",
-            {"hint": did_you_mean(value, MATERIALS), "known": ", ".join(MATERIALS)},
-        )
-    return value
 
 
 class Roughness(Checked):
@@ -87,12 +75,22 @@ class Roughness(Checked):
 class Body(Checked):
     """What all objects share."""
 
-    material: Annotated[str, AfterValidator(_material)] = Field(
-        description=f"one of {', '.join(MATERIALS)}"
+    material: Material = Field(
+        description=f"one of {', '.join(MATERIALS)}, or a table [objects.NAME.material]"
     )
     centre_m: Position = Field(description="the centre of the object [m]")
     angle_deg: Angle = Field(0.0, description="the azimuth of its length from +x [degree]")
-    roughness: Roughness | None = Field(None, description="the roughness of its surface")
+    roughness: Roughness | None = Field(
+        None, description="the roughness of its surface; without, what its material has by itself"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_rough_as_its_material(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or data.get("roughness") is not None:
+            return data
+        texture = usual_texture(data.get("material"))
+        return data if texture is None else {**data, "roughness": texture}
 
     @model_validator(mode="after")
     def _an_absorber_has_no_facets(self) -> "Body":

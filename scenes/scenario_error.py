@@ -9,6 +9,9 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+NAME_TAG, TABLE_TAG = "[name]", "[table]"
+"""Mark in pydantic's locations whether a name or a table was read; no key of a scenario's."""
+
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxdict = _SHORT.maxlist = _SHORT.maxtuple = 4
@@ -115,6 +118,8 @@ def _place(location: tuple[int | str, ...], model: type[BaseModel]) -> _Place:
             path.append(str(steps.pop(0)))
             field = None
         inner = choices
+        if steps and steps[0] in (NAME_TAG, TABLE_TAG):
+            steps.pop(0)
         if len(choices) > 1 and steps and steps[0] != "[key]":
             tag = steps.pop(0)
             inner = [choice for choice in choices if tag in _tags(choice)]

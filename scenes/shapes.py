@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 
 from scenes.facet_spacing import BYTES_PER_FACET, MOST_BYTES, facet_count
 from scenes.heights import Heights
+from scenes.materials import Slab
 from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario, ScenarioError
@@ -31,7 +32,7 @@ class Surface:
     """One object's surface: a frozen realisation, the same from every antenna."""
 
     name: str
-    material: str
+    material: str | Slab
     vertices: Float[np.ndarray, "vertices 3"]  # displaced by the roughness [m]
     mean_vertices: Float[np.ndarray, "vertices 3"]  # of the smooth shape [m]
     cells: Int[np.ndarray, "cells corners"]  # indices: two per line, three per triangle

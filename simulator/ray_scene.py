@@ -1,6 +1,6 @@
 """The scene that rays are traced in: a Sionna RT scene of the scenario's surfaces."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import drjit as dr
@@ -27,14 +27,34 @@ RAYS_AT_ONCE = 4_000_000
 """Rays traced in one go: about 300 MB of single-precision rays."""
 
 
-def build_scene(surfaces: Sequence[Surface]) -> rt.Scene:
-    """Build a Sionna RT scene; each surface becomes an object of its name."""
+def build_scene(
+    surfaces: Sequence[Surface],
+    *,
+    materials: Mapping[str, rt.RadioMaterial] | None = None,
+    half_height: float = HALF_HEIGHT,
+) -> rt.Scene:
+    """Build a Sionna RT scene; each surface becomes an object of its name.
+
+    Parameters
+    ----------
+    surfaces
+        Lines become upright strips.
+    materials
+        Radio material of each surface, by the surface's name; without, all are conductors,
+        which does for rays that only ask what they meet.
+    half_height
+        Half the height of the strips. [m]
+    """
     scene = rt.Scene()
     # Sionna's own 'metal' ends at 100 GHz; its constants do for a conductor at any frequency.
     # Its name is in the objects' name space, and none of theirs holds a slash.
     metal = rt.RadioMaterial("/conductor", relative_permittivity=1.0, conductivity=1e7)
     objects = [
-        rt.SceneObject(mi_mesh=_mesh(surface), name=surface.name, radio_material=metal)
+        rt.SceneObject(
+            mi_mesh=_mesh(surface, half_height),
+            name=surface.name,
+            radio_material=metal if materials is None else materials[surface.name],
+        )
         for surface in surfaces
     ]
     if objects:
@@ -42,10 +62,10 @@ def build_scene(surfaces: Sequence[Surface]) -> rt.Scene:
     return scene
 
 
-def _mesh(surface: Surface) -> mi.Mesh:
+def _mesh(surface: Surface, half_height: float) -> mi.Mesh:
     vertices, faces = surface.vertices, surface.cells
     if faces.shape[1] == 2:
-        vertices, faces = _extruded(vertices, faces)
+        vertices, faces = _extruded(vertices, faces, half_height)
     mesh = mi.Mesh(surface.name, vertex_count=len(vertices), face_count=len(faces))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(vertices.ravel().astype(np.float32))
@@ -55,10 +75,10 @@ def _mesh(surface: Surface) -> mi.Mesh:
 
 
 def _extruded(
-    vertices: Float[np.ndarray, "vertices 3"], lines: np.ndarray
+    vertices: Float[np.ndarray, "vertices 3"], lines: np.ndarray, half_height: float
 ) -> tuple[np.ndarray, np.ndarray]:
     count = len(vertices)
-    up = np.array([0.0, 0.0, HALF_HEIGHT])
+    up = np.array([0.0, 0.0, half_height])
     first, second = lines.T
     lower = np.stack([first, second, second + count], axis=-1)
     upper = np.stack([first, second + count, first + count], axis=-1)
