@@ -27,8 +27,10 @@ TRIALS = 9
 """Trial angles and trial offsets of each round."""
 ROUNDS = 4
 """Rounds; each looks at a third of the neighbourhood of the one before."""
-CELLS_PER_BLOCK = 6.0
-"""Cells in a block: neighbouring cells share speckle, blocks hardly."""
+CELLS_PER_BLOCK = 14.0
+"""Cells in a block. A cell's speckle pushes its neighbours' part of the line the other way:
+over 26 realisations, blocks of 3 cells gave 2.8 times the true deviation of the angle, 6 cells
+2.3 times, 12 cells 1.6 times, 20 cells 1.5 times, but from 8 blocks only."""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
 CELLS_CUT = 2.0
