@@ -73,4 +73,6 @@ def array_frame(
             f"boresight: {np.degrees(np.arccos(slant)):.2f}° from the array's axis; it must be "
             "perpendicular to it (90°)"
         )
-    return ArrayFrame(origin=origin, axes=np.stack([axis, boresight, np.cross(axis, boresight)]))
+    ahead = boresight - (boresight @ axis) * axis  # a rounded boresight must not bend space
+    ahead = ahead / np.linalg.norm(ahead)
+    return ArrayFrame(origin=origin, axes=np.stack([axis, ahead, np.cross(axis, ahead)]))

@@ -67,6 +67,16 @@ class Measurement:
         """Refuse a measurement without data."""
         if self.echo is None and not self.uplinks:
             raise MeasurementError("the measurement has neither 'echo' nor 'uplink': give one")
+        parts = [*([self.echo] if self.echo else []), *self.uplinks]
+        if any(not np.array_equal(part.frequencies, parts[0].frequencies) for part in parts):
+            raise MeasurementError(
+                "echo and uplinks have different frequencies; measure all on one grid"
+            )
+        first = self.uplinks[:1]
+        if any(not np.array_equal(one.positions, first[0].positions) for one in self.uplinks):
+            raise MeasurementError(
+                "the uplinks have different element positions; one array receives all users"
+            )
 
 
 def frequency_step(frequencies: Float[np.ndarray, " freqs"]) -> float:

@@ -4,7 +4,8 @@ Layout (dimensions in brackets)::
 
     echo [position, frequency]            complex S-parameter
     uplink [user, element, frequency]     complex S-parameter
-    aperture_position [position, axis]    m
+    aperture_position [position, axis]    m, of the receiver
+    transmit_position [position, axis]    m, where the transmitter stands apart
     element_position [element, axis]      m
     frequency [frequency]                 Hz
     user [user]                           labels
@@ -30,6 +31,9 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
     if echo := measurement.echo:
         variables["echo"] = (("position", "frequency"), echo.samples, sparameter)
         variables["aperture_position"] = (("position", "axis"), echo.positions, {"units": "m"})
+        if echo.transmit_positions is not None:
+            places = echo.transmit_positions
+            variables["transmit_position"] = (("position", "axis"), places, {"units": "m"})
         frequencies = echo.frequencies
     if measurement.uplinks:
         first = measurement.uplinks[0]
@@ -197,6 +201,11 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
             samples=_array(path, dataset, "echo", ("position", "frequency"), complex),
             positions=_array(path, dataset, "aperture_position", ("position", "axis"), float),
             frequencies=frequencies,
+            transmit_positions=_array(
+                path, dataset, "transmit_position", ("position", "axis"), float
+            )
+            if "transmit_position" in dataset
+            else None,
         )
     uplinks: tuple[Uplink, ...] = ()
     if "uplink" in dataset:

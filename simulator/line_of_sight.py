@@ -6,6 +6,10 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement import Waves
+from simulator.ray_scene import blocked
+
+SHORTEST_LEG = 0.011
+"""Length below which Sionna RT may leave a path out (its limit is 1 cm). [m]"""
 
 
 def in_line_of_sight(
@@ -24,6 +28,9 @@ def in_line_of_sight(
     )
     # [receiver, antenna, transmitter, antenna, path]
     seen = np.asarray(paths.valid.numpy(), dtype=bool).reshape(len(elements), -1).any(axis=-1)
+    # Sionna RT leaves out legs shorter than 1 cm.
+    near = np.linalg.norm(elements - user, axis=-1) < SHORTEST_LEG
+    seen[near] = ~blocked(scene, np.broadcast_to(user, elements[near].shape), elements[near])
     for name in ("/user", *names):
         scene.remove(name)
     return np.asarray(seen)

@@ -181,9 +181,7 @@ def test_one_sample_of_a_dataset_is_chosen(measurement: Measurement, tmp_path: P
     for sample in (0, 1):
         found = read_measurement(path, sample=sample)
         assert found.echo is not None
-        np.testing.assert_array_equal(
-            found.echo.samples, (1 + sample) * measurement.echo.samples
-        )
+        np.testing.assert_array_equal(found.echo.samples, (1 + sample) * measurement.echo.samples)
     with pytest.raises(MeasurementError, match=r"holds 2 samples; choose one, 0…1"):
         read_measurement(path)
     for sample in (2, -1):
@@ -344,8 +342,10 @@ def test_the_truth_lies_beside_and_is_not_read(
     write_measurement(store, measurement, truth=truth)
     with xr.open_zarr(store, group="truth", consolidated=False) as kept:
         np.testing.assert_array_equal(kept["user_position"].values, [[1.0, 0.8, 0.0]])
-    for file in (store / "truth").rglob("c/*"):
-        file.write_bytes(b"nonsense")
+    chunks = [path for path in (store / "truth").rglob("c/**/*") if path.is_file()]
+    assert chunks
+    for chunk in chunks:
+        chunk.write_bytes(b"nonsense")
     assert_same(read_measurement(store), measurement)
 
 
@@ -445,7 +445,6 @@ def test_a_folder_that_cannot_be_written_says_so(
 # What the layout cannot hold must not be lost on the way
 
 
-@pytest.mark.xfail(reason="the transmit positions are dropped without a word", strict=True)
 def test_an_echo_of_separate_transmitters_is_not_stored_as_monostatic(
     measurement: Measurement, tmp_path: Path
 ) -> None:
@@ -466,14 +465,9 @@ def test_an_echo_of_separate_transmitters_is_not_stored_as_monostatic(
 
 
 @pytest.mark.parametrize("name", ["positions", "frequencies"])
-@pytest.mark.xfail(reason="those of the first uplink are written for all", strict=True)
-def test_uplinks_at_other_elements_or_frequencies_are_not_stored_as_one(
-    name: str, measurement: Measurement, tmp_path: Path
+def test_uplinks_at_other_elements_or_frequencies_are_refused(
+    name: str, measurement: Measurement
 ) -> None:
     other = {"positions": ELEMENTS + 0.01, "frequencies": FREQUENCIES + 1e9}[name]
-    mixed = replace(measurement, uplinks=(uplink("ann"), uplink("bob", **{name: other})))
-    try:
-        write_measurement(tmp_path / "a.zarr", mixed)
-    except MeasurementError:
-        return
-    assert_same(read_measurement(tmp_path / "a.zarr"), mixed)
+    with pytest.raises(MeasurementError, match=f"different .*{name}"):
+        replace(measurement, uplinks=(uplink("ann"), uplink("bob", **{name: other})))

@@ -120,7 +120,6 @@ def test_looking_twice_and_at_several_users_leaves_the_scene_as_it_was() -> None
     assert not scene.receivers
 
 
-@pytest.mark.xfail(reason="Sionna RT drops legs shorter than 1 cm", strict=True)
 def test_a_user_half_a_centimetre_away_is_seen() -> None:
     assert in_line_of_sight(build_scene([]), np.array([0.0, 5e-3, 0.0]), ELEMENTS).all()
 

@@ -193,7 +193,6 @@ def test_moving_the_whole_scene_within_a_building_hides_nothing(x: float, y: flo
     assert visible([moved], moved, ARRAY + shift).all()
 
 
-@pytest.mark.xfail(reason="single precision: beyond 32 m, 2 µm is a rounding error", strict=True)
 def test_moving_the_whole_scene_by_a_hundred_metres_hides_nothing() -> None:
     wall = rough_wall(rms=0.0, correlation=1e-3)
     shift = np.array([100.0, 100.0, 0.0])
