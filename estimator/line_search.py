@@ -43,10 +43,10 @@ class Resolution:
         reach = np.linalg.norm(points, axis=-1)
         radial = np.abs(points @ direction) / reach
         crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
-        width: np.ndarray = 1 / np.hypot(
+        width = 1 / np.hypot(
             radial / self.along_ray, crossing / (self.across_ray * reach)
         )
-        return width
+        return np.asarray(width)
 
 
 @dataclass(frozen=True, kw_only=True)

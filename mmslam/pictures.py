@@ -95,12 +95,13 @@ def angle_range_figure(estimate: Estimate) -> Figure:
     users = {user.name: user for user in estimate.users}
     figure = Figure(figsize=(11.5, 4.6 * len(estimate.maps)), layout="constrained")
     axes = figure.subplots(len(estimate.maps), 2, squeeze=False)
-    for (whole, enlarged), heard in zip(axes, estimate.maps, strict=True):
-        user = users.get(heard.user)
-        figures.draw_angle_range_map(whole, heard, user)
-        whole.set_title(f"Uplink of {heard.user}")
-        figures.draw_angle_range_map(enlarged, heard, user, enlarged=True)
-        enlarged.set_title("enlarged")
+    for row, whole, part in zip(axes, estimate.maps, estimate.close_ups, strict=True):
+        user = users.get(whole.user)
+        figures.draw_angle_range_map(row[0], whole, user)
+        row[0].set_title(f"Uplink of {whole.user}")
+        peak = max(float(np.abs(shown.values).max()) for shown in (whole, part))
+        figures.draw_angle_range_map(row[1], part, user, peak=peak)
+        row[1].set_title("enlarged")
     return figure
 
 

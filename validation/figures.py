@@ -22,7 +22,6 @@ USER = "#d1495b"
 PATH = "#e09f1f"
 ON_DARK = "#8ff0e4"  # for what is overlaid on an image
 
-_ENLARGED = 20  # samples of a map to each side of its peak, when enlarged
 _MOST_PIXELS = 1200  # along one side of a picture; a finer image is reduced to it
 
 
@@ -57,7 +56,7 @@ def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB
     )
     ax.set_facecolor("black")
     _level_bar(ax, mesh, "magnitude relative to the peak [dB]")
-    return _metres(ax, view)
+    return in_metres(ax, view)
 
 
 def overlay_mirrors(
@@ -110,19 +109,24 @@ def overlay_targets(ax: Axes, targets: Sequence[Target], *, colour: str = ON_DAR
 def overlay_users(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER) -> Axes:
     """Mark each user that was found."""
     for user in users:
-        if user.position is None:
-            continue
-        ax.plot(*user.position[:2], "o", color=colour, mec="white", ms=8, mew=1.2, zorder=6)
-        ax.annotate(
-            user.name,
-            _xy(user.position),
-            xytext=(0, 12),
-            textcoords="offset points",
-            color=colour,
-            ha="center",
-            fontsize=9,
-            fontweight="bold",
-        )
+        if user.position is not None:
+            mark_user(ax, user.name, user.position, colour=colour)
+    return ax
+
+
+def mark_user(ax: Axes, name: str, place: Float[np.ndarray, " 3"], *, colour: str = USER) -> Axes:
+    """Mark one user by a named dot."""
+    ax.plot(*place[:2], "o", color=colour, mec="white", ms=8, mew=1.2, zorder=6)
+    ax.annotate(
+        name,
+        _xy(place),
+        xytext=(0, 12),
+        textcoords="offset points",
+        color=colour,
+        ha="center",
+        fontsize=9,
+        fontweight="bold",
+    )
     return ax
 
 
@@ -157,7 +161,7 @@ def draw_angle_range_map(
     heard: AngleRangeMap,
     user: UserEstimate | None,
     *,
-    enlarged: bool = False,
+    peak: float | None = None,
     floor_db: float = FLOOR_DB,
 ) -> Axes:
     """Draw the matched filter of a pilot over angle and path length, and mark its peak.
@@ -167,28 +171,20 @@ def draw_angle_range_map(
     ax
         Gets degrees and metres.
     heard
-        The map.
+        The map, or a part of it.
     user
         Whose angle and path length are marked, if they were found.
-    enlarged
-        Whether only the surroundings of the mark (else of the peak) are shown.
+    peak
+        What 0 dB is, for a part that is to be compared with the whole; by default the
+        highest magnitude in it. A part is drawn smoothly, and marked on the peak itself.
     floor_db
         The darkest level, below the peak.
     """
-    magnitude = np.abs(heard.values)
-    peak = magnitude.max()
-    aoa, length = np.degrees(heard.aoa), heard.path_length
-    if enlarged:
-        around = np.unravel_index(int(np.argmax(magnitude)), magnitude.shape)
-        if user is not None and user.aoa is not None and user.path_length is not None:
-            around = (
-                np.argmin(np.abs(heard.aoa - user.aoa)),
-                np.argmin(np.abs(length - user.path_length)),
-            )
-        part = tuple(slice(max(int(n) - _ENLARGED, 0), int(n) + _ENLARGED + 1) for n in around)
-        magnitude, aoa, length = magnitude[part], aoa[part[0]], length[part[1]]
-    magnitude, aoa, length = _brightest_of_blocks(magnitude, aoa, length)
-    level = _decibels(magnitude, peak, floor_db)
+    enlarged = peak is not None
+    magnitude, aoa, length = _brightest_of_blocks(
+        np.abs(heard.values), np.degrees(heard.aoa), heard.path_length
+    )
+    level = _decibels(magnitude, magnitude.max() if peak is None else peak, floor_db)
     # A mesh, not a picture: angles are spaced evenly in their cosine.
     mesh = ax.pcolormesh(
         aoa,
@@ -208,7 +204,7 @@ def draw_angle_range_map(
         chosen = estimate is user
         if not aoa[0] <= angle <= aoa[-1] or not length[0] <= estimate.path_length <= length[-1]:
             continue
-        if enlarged:  # on the bright peak itself
+        if enlarged:
             ax.plot(angle, estimate.path_length, "+", mec=MIRROR, ms=12, mew=1.5)
         else:
             ax.plot(angle, estimate.path_length, "o", mfc="none", mec=ON_DARK, ms=14, mew=1.5)
@@ -263,7 +259,7 @@ def draw_localization(
     for place in true_positions:
         ax.plot(*place[:2], "o", mfc="none", mec=INK, ms=15, mew=1.4, zorder=7)
     overlay_users(ax, estimate.users)
-    return _metres(ax, view)
+    return in_metres(ax, view)
 
 
 def draw_close_up(
@@ -338,7 +334,8 @@ def _xy(point: Float[np.ndarray, " 3"]) -> tuple[float, float]:
     return float(point[0]), float(point[1])
 
 
-def _metres(ax: Axes, view: View) -> Axes:
+def in_metres(ax: Axes, view: View) -> Axes:
+    """Give the axes the view's limits, equal scales and labels in metres."""
     ax.set(
         xlim=(view.left, view.right),
         ylim=(view.bottom, view.top),

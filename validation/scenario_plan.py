@@ -48,25 +48,8 @@ def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
     for place, antenna, colour in beams:
         _draw_beam(ax, place, scenario.aim(antenna, place), antenna, colour, _BEAM * size)
     for name, place in users.items():
-        ax.plot(*place[:2], "o", color=figures.USER, mec="white", ms=8, mew=1.2, zorder=6)
-        ax.annotate(
-            name,
-            (float(place[0]), float(place[1])),
-            xytext=(0, 9),
-            textcoords="offset points",
-            ha="center",
-            color=figures.USER,
-            fontweight="bold",
-            fontsize=9,
-        )
-    ax.set(
-        xlim=(view.left, view.right),
-        ylim=(view.bottom, view.top),
-        aspect="equal",
-        xlabel="x, along the array [m]",
-        ylabel="y, boresight [m]",
-    )
-    return ax
+        figures.mark_user(ax, name, place)
+    return figures.in_metres(ax, view)
 
 
 def outline(scenario: Scenario, name: str) -> Float[np.ndarray, "corners 3"]:
@@ -93,7 +76,8 @@ def _draw_object(
     ax: Axes, scenario: Scenario, name: str, line: Float[np.ndarray, "corners 3"]
 ) -> None:
     body = scenario.objects[name]
-    colour = MATERIAL_COLOURS.get(body.material, figures.PATH)
+    material = body.material if isinstance(body.material, str) else body.material.name or "slab"
+    colour = MATERIAL_COLOURS.get(material, figures.PATH)
     if isinstance(body, Plate):
         ax.plot(line[:, 0], line[:, 1], color=colour, lw=3.5, solid_capstyle="butt", zorder=3)
     elif isinstance(body, Cylinder):
@@ -104,7 +88,7 @@ def _draw_object(
     rough = f", {body.roughness.rms_mm:g} mm rms" if body.roughness else ""
     centre = line.mean(axis=0)
     ax.annotate(
-        f"{name} ({body.material}{rough})",
+        f"{name} ({material}{rough})",
         (float(centre[0]), float(centre[1])),
         xytext=(0, 8),
         textcoords="offset points",

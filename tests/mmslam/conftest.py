@@ -57,6 +57,12 @@ def estimate() -> Estimate:
         confidence=0.999,
         level_db=24.0,
     )
+    heard = AngleRangeMap(
+        values=np.ones((5, 7), dtype=np.complex128),
+        aoa=np.linspace(1.4, 1.7, 5),
+        path_length=np.linspace(1.7, 1.9, 7),
+        user="ann",
+    )
     return Estimate(
         users=(user,),
         mirrors=(mirror,),
@@ -69,14 +75,8 @@ def estimate() -> Estimate:
         ),
         raw_image=image,
         corrected_image=image,
-        maps=(
-            AngleRangeMap(
-                values=np.ones((5, 7), dtype=np.complex128),
-                aoa=np.linspace(1.4, 1.7, 5),
-                path_length=np.linspace(1.7, 1.9, 7),
-                user="ann",
-            ),
-        ),
+        maps=(heard,),
+        close_ups=(heard,),
         notes=("z = 0 and y > 0 are assumed",),
         timings={"image": 0.25},
     )

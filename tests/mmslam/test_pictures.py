@@ -35,6 +35,6 @@ def test_the_same_result_gives_the_same_bytes(
 def test_what_was_not_measured_has_no_figure(
     tmp_path: Path, measurement: Measurement, nothing_found: Estimate
 ) -> None:
-    deaf = replace(nothing_found, raw_image=None, maps=())
+    deaf = replace(nothing_found, raw_image=None, maps=(), close_ups=())
     pictures = write_pictures(tmp_path, replace(measurement, echo=None), deaf, Truth())
     assert sorted(pictures) == ["localization.png"]
