@@ -71,9 +71,9 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
         turned = np.exp(1j * centre * (path_length + excess))
         gathered = profiles[np.arange(len(across))[None, :, None], cells[:, :, None] + shifts]
         sums = np.abs(np.einsum("cm,cms->cs", turned, gathered))
-        j, k = np.unravel_index(int(np.argmax(sums)), sums.shape)
-        if sums[j, k] > best[0]:
-            best = float(sums[j, k]), i, int(j), int(k)
+        top = int(np.argmax(sums))
+        if sums.flat[top] > best[0]:
+            best = float(sums.flat[top]), i, top // shifts.size, top % shifts.size
     _, i, j, k = best
     return Start(
         aoa=float(np.arccos(cosines[j])),

@@ -67,8 +67,9 @@ class Measurement:
         """Refuse a measurement without data."""
         if self.echo is None and not self.uplinks:
             raise MeasurementError("the measurement has neither 'echo' nor 'uplink': give one")
-        parts = [*([self.echo] if self.echo else []), *self.uplinks]
-        if any(not np.array_equal(part.frequencies, parts[0].frequencies) for part in parts):
+        grids = [uplink.frequencies for uplink in self.uplinks]
+        grids += [self.echo.frequencies] if self.echo else []
+        if any(not np.array_equal(grid, grids[0]) for grid in grids):
             raise MeasurementError(
                 "echo and uplinks have different frequencies; measure all on one grid"
             )
