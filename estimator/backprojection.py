@@ -14,6 +14,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator import engine
+from estimator.lane_index import row_and_column
 from estimator.measurement import Echo, MeasurementError, Uplink
 from estimator.phasor import sincos_of_turns
 from estimator.range_profiles import RangeProfiles, range_profiles
@@ -145,10 +146,8 @@ def prepare(profiles: RangeProfiles) -> Focuser:
         )
     # A path length that is rounded up to the unambiguous one reads the first cells again.
     source = arrays.UInt64(np.ascontiguousarray(profiles.coefficients).view(np.uint64).ravel())
-    width = dr.opaque(arrays.UInt32, (cells + _GUARD) * order)
     entry = dr.arange(arrays.UInt32, channels * (cells + _GUARD) * order)
-    row = entry // width
-    column = entry - row * width
+    row, column = row_and_column(entry, (cells + _GUARD) * order)
     period = dr.opaque(arrays.UInt32, cells * order)
     column = dr.select(column < period, column, column - period)
     table = dr.gather(arrays.UInt64, source, row * period + column)

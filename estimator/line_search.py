@@ -43,9 +43,7 @@ class Resolution:
         reach = np.linalg.norm(points, axis=-1)
         radial = np.abs(points @ direction) / reach
         crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
-        width = 1 / np.hypot(
-            radial / self.along_ray, crossing / (self.across_ray * reach)
-        )
+        width = 1 / np.hypot(radial / self.along_ray, crossing / (self.across_ray * reach))
         return np.asarray(width)
 
 

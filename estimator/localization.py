@@ -27,9 +27,9 @@ from estimator.mirrors import (
     detect_mirrors,
     echo_reach,
     echo_resolution,
+    imaged_sine,
     loose_peaks,
     survey,
-    unaliased_sine,
 )
 from estimator.paths import find_paths
 from estimator.pixel_grid import PixelGrid
@@ -250,12 +250,12 @@ def _images(
     frame: ArrayFrame,
     walls: Sequence[Wall],
     seen: Sequence[tuple[int, ...]],
-    paths: Sequence[Float[np.ndarray, "vertices 3"]],
+    paths: Sequence[Float[np.ndarray, "_ 3"]],
 ) -> tuple[Image, Image]:
     """Form the raw and the corrected image on one grid, around what was found."""
     focuser = prepare(range_profiles(echo))
     nearest, farthest = echo_reach(echo)
-    sine = unaliased_sine(echo)
+    sine = imaged_sine(echo)
 
     def focus_in_reach(points: Float[np.ndarray, "*grid 3"]) -> np.ndarray:
         """Focus where range and angle are unambiguous; elsewhere there is no image: 0."""

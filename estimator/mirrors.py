@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
-from scipy.signal.windows import taylor
 
 from estimator.backprojection import backproject, focus, prepare
 from estimator.line_search import Resolution, find_lines, significant_peaks
@@ -14,9 +13,11 @@ from estimator.measurement import Echo, frequency_step
 from estimator.mirror_fit import FittedLine, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
+from estimator.resolution import HALF_POWER, unaliased_sine
+from estimator.windows import Window, aperture_taper, frequency_taper
 
-SIDELOBE_LEVEL_DB = 50
-"""Sidelobes of the survey's taper, below :data:`estimator.line_search.DYNAMIC_RANGE`. [dB]"""
+TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
+"""The survey's; its sidelobes are below :data:`estimator.line_search.DYNAMIC_RANGE`."""
 
 LEAST_CONFIDENCE = 0.999
 LEAST_CELLS = 8.0
@@ -47,10 +48,10 @@ def echo_reach(echo: Echo) -> tuple[float, float]:
     return 0.5 * aperture, farthest
 
 
-def unaliased_sine(echo: Echo) -> float:
-    """Return the largest |sin φ| that the positions sample without alias, λ_min/(4Δx)."""
+def imaged_sine(echo: Echo) -> float:
+    """Return the largest |sin φ| that is imaged: without grating lobes, and short of endfire."""
     spacing = float(np.ptp(echo.positions[:, 0])) / (len(echo.positions) - 1)
-    return min(0.95, speed_of_light / float(echo.frequencies[-1]) / (4 * spacing))
+    return min(0.95, unaliased_sine(spacing, speed_of_light / float(echo.frequencies[-1])))
 
 
 def survey(echo: Echo) -> Survey:
@@ -64,7 +65,7 @@ def survey(echo: Echo) -> Survey:
     resolution = echo_resolution(echo)
     nearest, farthest = echo_reach(echo)
     ranges = np.arange(nearest, farthest, 0.75 * resolution.along_ray)
-    limit = unaliased_sine(echo)
+    limit = imaged_sine(echo)
     count = 2 * int(np.ceil(limit / (0.75 * resolution.across_ray))) + 1
     sines = np.linspace(-limit, limit, count)
     points = np.zeros((ranges.size, count, 3))
@@ -76,12 +77,7 @@ def survey(echo: Echo) -> Survey:
 
 
 def _taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
-    return np.outer(_taper(len(echo.positions)), _taper(echo.frequencies.size))
-
-
-def _taper(count: int) -> Float[np.ndarray, " count"]:
-    weights: np.ndarray = taylor(count, nbar=6, sll=SIDELOBE_LEVEL_DB, norm=True)
-    return weights
+    return np.outer(aperture_taper(echo.positions, TAPER), frequency_taper(echo.frequencies, TAPER))
 
 
 def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
@@ -144,9 +140,9 @@ def loose_peaks(
 
 
 def _coarse_resolution(echo: Echo) -> Resolution:
-    """Return the resolution of the survey, which its taper widens by about 1.4."""
-    fine = echo_resolution(echo)
-    return Resolution(along_ray=1.4 * fine.along_ray, across_ray=1.4 * fine.across_ray)
+    """Return the resolution of the survey, which its taper widens."""
+    fine, wider = echo_resolution(echo), TAPER.half_power_width / HALF_POWER
+    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
 
 
 def _hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:

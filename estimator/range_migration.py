@@ -15,28 +15,25 @@ Two things differ from the thesis: with exp(+jωt), focusing needs :math:`e^{+j 
 its plain inverse FFT over k leaves the Stolt step out.
 """
 
-from dataclasses import dataclass
-from typing import Any
-
-import drjit as dr
 import finufft
 import numpy as np
 import scipy.fft
 from jaxtyping import Complex, Complex64, Float
 from scipy.constants import speed_of_light
 
-from estimator import engine
 from estimator.measurement import Echo, MeasurementError
-from estimator.phasor import sincos_of_turns
 from estimator.pixel_grid import PixelGrid
 from estimator.range_profiles import unambiguous_path
+from estimator.stolt import (
+    OVERSAMPLING,
+    ApertureAxis,
+    GatedSpectrum,
+    kernel_transform,
+    stolt,
+)
 
 LATTICE = 1e-3
 """Largest departure of a position from the aperture's grid, over its spacing. [-]"""
-
-OVERSAMPLING = 1.5  # of the spectrum, for the Stolt step
-TAPS = 6  # its kernel reaches over this many samples
-SHAPE = 0.97 * np.pi * TAPS * (1 - 0.5 / OVERSAMPLING)  # exponent of the kernel: errs by 1e-4
 
 GATE_MARGIN = 24.0
 """Range that the gate's slopes take on each side, over c/2B. [-]
@@ -45,6 +42,7 @@ Gating cuts away ranges that no pixel needs, and with them most of the work. Wha
 gate adds to the width of the band (about a twelfth) is kept by the margin of the spectrum.
 """
 
+BAND_MARGIN = 1.12  # width within which the gate leaves anything, over that of the band
 SPECTRUM_MARGIN = 1.25  # width of the kept spectrum over that of the band
 
 FRESNEL_MARGIN = 3.0
@@ -52,37 +50,6 @@ FRESNEL_MARGIN = 3.0
 
 The ends of the aperture blur the stationary points by about one of these lengths.
 """
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Axis:
-    """Positions along one axis of the aperture, and the transform over them."""
-
-    start: float  # first position [m]
-    spacing: float  # [m]
-    size: int  # length of the zero-padded transform; 1: the aperture does not span the axis
-    tangent: float  # the pixels' largest ratio of this axis' wavenumber to k_y
-    slope: float  # over which the spectrum falls off beyond it
-
-    @property
-    def wavenumbers(self) -> Float[np.ndarray, " size"]:
-        return np.asarray(2 * np.pi * scipy.fft.fftfreq(self.size, self.spacing))
-
-    @property
-    def period(self) -> float:
-        return self.size * self.spacing if self.size > 1 else 1.0
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Spectrum:
-    """Samples over a short, oversampled grid of frequencies, for ranges inside the gate."""
-
-    values: Complex64[np.ndarray, "*aperture freqs"]  # in the order of an FFT
-    carrier: float  # wavenumber of the first one [rad/m]
-    step: float  # [rad/m]
-    reference: float  # range whose phase over the band is taken out [m]
-    near: float  # the gate [m]
-    far: float  # [m]
 
 
 def range_migration(
@@ -128,7 +95,7 @@ def range_migration(
     )
     planes = _over_aperture(spectrum.values, echo.positions[:, ::2], axes)
     corner = (grid.x[0] - axes[0].start, depth[0], grid.z[0] - axes[1].start)
-    image = _stolt(planes, spectrum, axes, depth, corner)
+    image = stolt(planes, spectrum, axes, depth, corner)
     image = _at_pixels(image, 0, axes[0], grid.x)
     image = _at_pixels(image, 1, axes[1], grid.z)
     spread = 2j * np.pi * depth
@@ -177,7 +144,7 @@ def _ranges(echo: Echo, grid: PixelGrid) -> tuple[float, float]:
 
 def _gated(
     samples: Complex[np.ndarray, "positions freqs"], echo: Echo, near: float, far: float
-) -> _Spectrum:
+) -> GatedSpectrum:
     """Cut the needed ranges out, and return to frequencies just dense enough for them."""
     frequencies = echo.frequencies
     step = speed_of_light / unambiguous_path(frequencies)
@@ -209,11 +176,12 @@ def _gated(
     size = int(scipy.fft.next_fast_len(int(np.ceil(OVERSAMPLING * count))))
     places = np.arange(count) - count // 2
     segment = np.zeros((len(samples), size), dtype=np.complex64)
-    segment[:, places] = window / (size * _kernel_transform(places / size))
-    return _Spectrum(
+    segment[:, places] = window / (size * kernel_transform(places / size))
+    return GatedSpectrum(
         values=scipy.fft.fft(segment, axis=1, workers=-1, overwrite_x=True),
         carrier=2 * np.pi * carrier / speed_of_light,
         step=2 * np.pi * step * cells / size / speed_of_light,
+        reach=2 * np.pi * half * step * BAND_MARGIN / speed_of_light,
         reference=(first + count // 2) * cell,
         near=max(near - margin * cell, 0.0),
         far=far + margin * cell,
@@ -228,24 +196,17 @@ def _slopes(count: int, margin: int) -> Float[np.ndarray, " count"]:
     return gate
 
 
-def _kernel_transform(places: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Transform the Stolt step's kernel exp(β(√(1-x²)-1)), x over half its reach."""
-    nodes, quadrature = np.polynomial.legendre.leggauss(40)
-    values = quadrature * np.exp(SHAPE * (np.sqrt(1 - nodes**2) - 1)) * TAPS / 2
-    return np.asarray(np.cos(np.pi * TAPS * np.outer(places, nodes)) @ values)
-
-
 def _axis(
     positions: Float[np.ndarray, " positions"],
     pixels: Float[np.ndarray, " n"],
     depth: Float[np.ndarray, " ny"],
     far: float,
     wavelength: float,
-) -> _Axis:
+) -> ApertureAxis:
     """Choose a transform long enough that nothing wraps round into the image."""
     places = np.unique(np.round(positions, 12))
     if places[-1] - places[0] < 1e-9:
-        return _Axis(start=float(places[0]), spacing=1.0, size=1, tangent=1.0, slope=1.0)
+        return ApertureAxis(start=float(places[0]), spacing=1.0, size=1, tangent=1.0, slope=1.0)
     steps = np.diff(places)
     spacing = float(np.median(steps[steps > 0.5 * np.median(steps)]))
     low, high = float(places[0]), float(places[-1])
@@ -262,15 +223,17 @@ def _axis(
     while wanted < 1.2 * size:  # a period of whole pixels lets an FFT reach the pixels
         ratio = wanted * spacing / pixel
         if abs(ratio - round(ratio)) < 1e-6:
-            return _Axis(start=low, spacing=spacing, size=wanted, tangent=tangent, slope=slope)
+            return ApertureAxis(
+                start=low, spacing=spacing, size=wanted, tangent=tangent, slope=slope
+            )
         wanted = int(scipy.fft.next_fast_len(wanted + 1))
-    return _Axis(start=low, spacing=spacing, size=size, tangent=tangent, slope=slope)
+    return ApertureAxis(start=low, spacing=spacing, size=size, tangent=tangent, slope=slope)
 
 
 def _over_aperture(
     values: Complex64[np.ndarray, "positions freqs"],
     positions: Float[np.ndarray, "positions 2"],
-    axes: tuple[_Axis, ...],
+    axes: tuple[ApertureAxis, ...],
 ) -> Complex64[np.ndarray, "kx kz freqs"]:
     """Transform over the aperture's grid; missing positions count as zeros."""
     places = [
@@ -297,133 +260,10 @@ def _over_aperture(
     return np.asarray(planes)
 
 
-def _stolt(
-    planes: Complex64[np.ndarray, "kx kz freqs"],
-    spectrum: _Spectrum,
-    axes: tuple[_Axis, ...],
-    depth: Float[np.ndarray, " ny"],
-    corner: tuple[float, float, float],
-) -> Complex64[np.ndarray, "kx kz ny"]:
-    """Bring uniform k onto uniform k_y, and transform to depths."""
-    cosine = 1 / np.sqrt(
-        1 + sum((axis.tangent + axis.slope) ** 2 for axis in axes if axis.size > 1)
-    )
-    widest = spectrum.values.shape[-1] * spectrum.step
-    high = 2 * spectrum.carrier + widest
-    low = max(2 * spectrum.carrier - widest, 0.0) * cosine
-    # Long enough that depths inside the gate, but outside the image, do not wrap into it.
-    length = max(spectrum.far - depth[0], depth[-1] - spectrum.near * cosine)
-    pixel = depth[1] - depth[0] if depth.size > 1 else 2 * np.pi / (high - low)
-    size = int(scipy.fft.next_fast_len(int(np.ceil(length / pixel)) + 2))
-    step = 2 * np.pi / (size * pixel)
-    band = (int(np.floor(low / step)), int(np.ceil(high / step)))
-    gridded = _gridded(planes, spectrum, axes, size, step, band, corner)
-    image = scipy.fft.ifft(gridded, axis=2, norm="forward", workers=-1, overwrite_x=True)
-    return np.asarray(image[:, :, : depth.size])
-
-
-def _gridded(
-    planes: Complex64[np.ndarray, "kx kz freqs"],
-    spectrum: _Spectrum,
-    axes: tuple[_Axis, ...],
-    size: int,
-    step: float,
-    band: tuple[int, int],
-    corner: tuple[float, float, float],
-) -> Complex64[np.ndarray, "kx kz ky"]:
-    """Interpolate each line of the spectrum at the k that belong to uniform k_y.
-
-    A k_y and those that differ from it by whole turns per pixel share one element. The
-    phases of the first pixel are applied as well, in float64.
-    """
-    arrays = engine.arrays()
-    freqs = planes.shape[2]
-    source = arrays.UInt64(np.ascontiguousarray(planes).view(np.uint64).ravel())
-    element = dr.arange(arrays.UInt32, planes.shape[0] * planes.shape[1] * size)
-    line = element // dr.opaque(arrays.UInt32, size)
-    column = element - line * dr.opaque(arrays.UInt32, size)
-    row = line // dr.opaque(arrays.UInt32, planes.shape[1])
-    rank = line - row * dr.opaque(arrays.UInt32, planes.shape[1])
-    kx = dr.gather(arrays.Float64, arrays.Float64(axes[0].wavenumbers), row)
-    kz = dr.gather(arrays.Float64, arrays.Float64(axes[1].wavenumbers), rank)
-    scalar = {
-        name: dr.opaque(arrays.Float64, float(value))
-        for name, value in {
-            "step": step,
-            "size": size,
-            "carrier": spectrum.carrier,
-            "density": 1 / spectrum.step,
-            "reference": spectrum.reference * spectrum.step,
-            "first": band[0],
-            "x": corner[0],
-            "y": corner[1],
-            "z": corner[2],
-            "tangent_x": axes[0].tangent,
-            "tangent_z": axes[1].tangent,
-            "slope_x": axes[0].slope,
-            "slope_z": axes[1].slope,
-            # dk_y for the sum over it, 1/step for that over k, 1/(period) for each of the others
-            "scale": step / spectrum.step / (axes[0].period * axes[1].period) / 2,
-        }.items()
-    }
-    total_re, total_im = arrays.Float(0), arrays.Float(0)
-    # The lowest of the band's wavenumbers that fall on this element.
-    lowest = dr.ceil((scalar["first"] - arrays.Float64(column)) / scalar["size"])
-    sideways = kx * scalar["x"] + kz * scalar["z"]
-    for turn in range(-(-(band[1] - band[0]) // size)):
-        ky = (arrays.Float64(column) + (lowest + turn) * scalar["size"]) * scalar["step"]
-        place = dr.sqrt(kx * kx + kz * kz + ky * ky) / 2
-        place = (place - scalar["carrier"]) * scalar["density"]
-        sector = _falloff(scalar["tangent_x"], scalar["slope_x"], kx, ky)
-        if axes[1].size > 1:
-            sector *= _falloff(scalar["tangent_z"], scalar["slope_z"], kz, ky)
-        inside = sector > 0
-        inside &= (ky > 0) & (dr.abs(place) < dr.opaque(arrays.Float64, freqs / 2 - TAPS))
-        re, im = _interpolated(arrays, source, line, freqs, place, inside)
-        phase = sideways + ky * scalar["y"] - 2 * place * scalar["reference"]
-        cycles = phase / (2 * np.pi)
-        sine, cosine = sincos_of_turns(arrays.Float(cycles - dr.round(cycles)))
-        jacobian = sector * (dr.rsqrt(ky) if axes[1].size == 1 else dr.rcp(ky))
-        weight = arrays.Float(dr.select(inside, scalar["scale"] * jacobian, 0.0))
-        total_re += weight * (re * cosine - im * sine)
-        total_im += weight * (re * sine + im * cosine)
-    low = arrays.UInt64(dr.reinterpret_array(arrays.UInt32, total_re))
-    high = arrays.UInt64(dr.reinterpret_array(arrays.UInt32, total_im))
-    values = (low | (high << 32)).numpy().view(np.complex64)
-    return np.asarray(values.reshape(*planes.shape[:2], size))
-
-
-def _falloff(tangent: Any, slope: Any, sideways: Any, forward: Any) -> Any:
-    """Weigh a direction: 1 where pixels need it, smoothly 0 at ``slope`` beyond."""
-    beyond = (dr.abs(sideways) - tangent * forward) / (slope * forward)
-    fall = 1 - dr.clip(beyond, 0.0, 1.0)
-    return dr.select(forward > 0, fall * fall * (3 - 2 * fall), 0.0)
-
-
-def _interpolated(
-    arrays: Any, source: Any, line: Any, freqs: int, place: Any, inside: Any
-) -> tuple[Any, Any]:
-    """Sum the neighbours of a place on each line, weighted by the gridding kernel."""
-    first = dr.ceil(place - TAPS / 2)
-    distance = arrays.Float(first - place)
-    count = dr.opaque(arrays.Int32, freqs)
-    base = line * arrays.UInt32(count)
-    re, im = arrays.Float(0), arrays.Float(0)
-    for tap in range(TAPS):
-        x = (distance + tap) * (2 / TAPS)
-        kernel = dr.exp(SHAPE * (dr.sqrt(dr.maximum(1 - x * x, 0.0)) - 1))
-        index = arrays.Int32(first) + tap
-        index = dr.select(index < 0, index + count, index)  # the order of an FFT
-        pair = dr.gather(arrays.UInt64, source, base + arrays.UInt32(index), inside)
-        re = dr.fma(kernel, dr.reinterpret_array(arrays.Float, arrays.UInt32(pair)), re)
-        im = dr.fma(kernel, dr.reinterpret_array(arrays.Float, arrays.UInt32(pair >> 32)), im)
-    return re, im
-
-
 def _at_pixels(
     spectrum: Complex64[np.ndarray, "kx kz ny"],
     dimension: int,
-    axis: _Axis,
+    axis: ApertureAxis,
     pixels: Float[np.ndarray, " n"],
 ) -> Complex64[np.ndarray, "..."]:
     """Sum one axis' plane waves at its pixels, by FFT where a period is whole pixels."""

@@ -40,7 +40,13 @@ def write_pictures(
         output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
     ):
         if image is not None:
-            drawn[name] = image_figure(image, estimate, positions, corrected="corrected" in name)
+            drawn[name] = image_figure(
+                image,
+                estimate,
+                positions,
+                corrected="corrected" in name,
+                frequencies=measurement.echo.frequencies if measurement.echo else None,
+            )
     if estimate.maps:
         drawn["angle_range_map.png"] = angle_range_figure(estimate)
     drawn["localization.png"] = localization_figure(estimate, positions, truth)
@@ -68,10 +74,12 @@ def image_figure(
     positions: Float[np.ndarray, "positions 3"],
     *,
     corrected: bool,
+    frequencies: Float[np.ndarray, " freqs"] | None = None,
 ) -> Figure:
     """Draw a SAR image: raw with the mirrors marked, corrected with all that was found.
 
-    Both show the same part of the plane, to be looked at side by side.
+    Both show the same part of the plane, to be looked at side by side. With the echo's
+    frequencies, bars tell the resolution.
     """
     images = [shown for shown in (estimate.raw_image, estimate.corrected_image) if shown]
     bright = [views.bright_points(shown) for shown in images]
@@ -80,6 +88,8 @@ def image_figure(
     ax = figures.draw_image(figure.subplots(), image, view=view)
     figures.overlay_mirrors(ax, estimate.mirrors, line=corrected)
     figures.overlay_array(ax, positions, colour=figures.ON_DARK)
+    if frequencies is not None:
+        figures.overlay_resolution(ax, view, _brightest_point(image), positions, frequencies)
     if corrected:
         figures.overlay_targets(ax, estimate.targets)
         figures.overlay_paths(ax, estimate.users, width=1.2)
@@ -88,6 +98,11 @@ def image_figure(
         "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
     )
     return figure
+
+
+def _brightest_point(image: Image) -> Float[np.ndarray, " 3"]:
+    place = np.unravel_index(int(np.argmax(np.abs(image.values))), image.values.shape)
+    return np.asarray(image.grid.points[place])
 
 
 def angle_range_figure(estimate: Estimate) -> Figure:

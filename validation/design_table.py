@@ -149,7 +149,7 @@ def design_table(
             value=degrees(unaliased_sine(spacing, shortest)),
             unit="° off broadside",
             note=ok(
-                unaliased_sine(spacing, shortest) >= abs(np.sin(angle)),
+                unaliased_sine(spacing, shortest) >= abs(float(np.sin(angle))),
                 f"too narrow for {np.degrees(angle):g}°",
             ),
         ),

@@ -2,6 +2,7 @@
 
 import runpy
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -125,10 +126,9 @@ def write_damaged(path: Path) -> None:
     ],
 )
 def test_a_file_that_is_no_archive_of_plain_arrays_is_refused(
-    write: "object", tmp_path: Path
+    write: Callable[[Path], object], tmp_path: Path
 ) -> None:
     path = tmp_path / "foreign.npz"
-    assert callable(write)
     write(path)
     with pytest.raises(MeasurementError, match=r"foreign\.npz: not an \.npz of plain arrays"):
         read_reference(path)
