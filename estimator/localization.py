@@ -281,5 +281,8 @@ def _grid(shown: Float[np.ndarray, "points 3"], cell: float) -> PixelGrid:
     low, high = shown.min(axis=0) - MARGIN, shown.max(axis=0) + MARGIN
     spacing = max(0.5 * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
     return PixelGrid.spanning(
-        x=(float(low[0]), float(high[0])), y=(float(low[1]), float(high[1])), spacing=spacing
+        x=(float(low[0]), float(high[0])),
+        y=(float(low[1]), float(high[1])),
+        z=float(shown[:, 2].mean()),
+        spacing=spacing,
     )

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.backprojection import backproject, focus, prepare
+from estimator.backprojection import Focuser, backproject, focus, prepare
 from estimator.line_search import Resolution, find_lines, significant_peaks
-from estimator.measurement import Echo, frequency_step
-from estimator.mirror_fit import FittedLine, fit_line
+from estimator.measurement import Echo, MeasurementError, frequency_step
+from estimator.mirror_fit import FittedLine, Focus, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 from estimator.resolution import HALF_POWER, unaliased_sine
@@ -42,10 +42,25 @@ def echo_resolution(echo: Echo) -> Resolution:
 
 
 def echo_reach(echo: Echo) -> tuple[float, float]:
-    """Return the distances between which an echo can be imaged: the aperture, and c/2Δf. [m]."""
+    """Return the distances between which an echo can be imaged. [m].
+
+    From half the aperture to the unambiguous range c/2Δf, less the aperture.
+
+    Raises
+    ------
+    MeasurementError
+        If nothing is left between.
+    """
     aperture = float(np.ptp(echo.positions[:, 0]))
-    farthest = speed_of_light / (2 * frequency_step(echo.frequencies)) - 1.1 * aperture
-    return 0.5 * aperture, farthest
+    step = frequency_step(echo.frequencies)
+    nearest, farthest = 0.5 * aperture, speed_of_light / (2 * step) - 1.1 * aperture
+    if farthest < 2 * nearest:
+        raise MeasurementError(
+            f"frequency step {step / 1e6:.4g} MHz: the echo is unambiguous to "
+            f"{speed_of_light / (2 * step):.3g} m only, less than twice the aperture of "
+            f"{aperture:.3g} m; take smaller frequency steps"
+        )
+    return nearest, farthest
 
 
 def imaged_sine(echo: Echo) -> float:
@@ -108,8 +123,8 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         if any(_lies_on(middle, line, coarse) for line in lines):
             continue  # a part of a wall that was followed to its ends already
         line = fit_line(
-            lambda points: focus(plain, points),
-            lambda points: focus(tapered, points),
+            focus_within(plain, reach[1]),
+            focus_within(tapered, reach[1]),
             candidate.start,
             candidate.end,
             resolution,
@@ -122,6 +137,20 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
             continue
         lines.append(line)
     return tuple(sorted(lines, key=lambda line: -line.level))
+
+
+def focus_within(focuser: Focuser, farthest: float) -> Focus:
+    """Return a function that focuses on points; beyond what is unambiguous there is 0."""
+
+    def focused(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
+        inside = np.einsum("...x,...x->...", points, points) < farthest**2
+        if np.all(inside):
+            return focus(focuser, points)
+        values = np.zeros(points.shape[:-1], dtype=np.complex128)
+        values[inside] = focus(focuser, points[inside])
+        return values
+
+    return focused
 
 
 def loose_peaks(

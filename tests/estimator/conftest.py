@@ -34,7 +34,8 @@ def rough_line(
     normal = np.array([along[1], -along[0], 0.0])
     places = length * (rng.random(count) - 0.5)
     heights = rms * rng.standard_normal(count)
-    return np.array([*middle, 0.0]) + places[:, None] * along + heights[:, None] * normal
+    centre = np.array([*middle, 0.0])
+    return np.asarray(centre + places[:, None] * along + heights[:, None] * normal)
 
 
 def noisy(

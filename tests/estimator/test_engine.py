@@ -11,7 +11,8 @@ import pytest
 from estimator import engine
 
 CHECKOUT = Path(__file__).resolve().parent.parent.parent
-HAS_CUDA = dr.has_backend(dr.JitBackend.CUDA)
+HAS_CUDA = bool(dr.has_backend(dr.JitBackend.CUDA))
+HAS_LLVM = bool(dr.has_backend(dr.JitBackend.LLVM))
 
 TOLD = """
 from estimator import engine
@@ -83,7 +84,7 @@ def test_an_llvm_that_is_too_old_is_refused_before_sionna_could_abort() -> None:
     assert told.splitlines()[-1] == "False False"
 
 
-@pytest.mark.skipif(not dr.has_backend(dr.JitBackend.LLVM), reason="LLVM is not installed")
+@pytest.mark.skipif(not HAS_LLVM, reason="LLVM is not installed")
 def test_llvm_can_be_asked_for_in_any_case_and_with_spaces() -> None:
     assert run(TOLD, MMSLAM_BACKEND=" LLVM ") == "backend llvm\n"
 

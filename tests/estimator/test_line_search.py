@@ -32,7 +32,7 @@ def on_line(
     places = (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / (count - 1)
     peaks = first + np.clip(places, 0, 1)[:, None] * (last - first)
     peaks[:, :2] += scatter * rng.standard_normal((count, 2))
-    return peaks
+    return np.asarray(peaks)
 
 
 def thrown(count: int, seed: int) -> Float[np.ndarray, "peaks 3"]:
@@ -61,7 +61,7 @@ def test_the_cell_is_fine_along_the_ray_and_widens_with_range_across_it() -> Non
 def test_peaks_on_a_line_are_found_as_a_line_with_its_ends(angle: float, seed: int) -> None:
     half = 0.1 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
     middle = np.array([0.02, 0.6])
-    peaks = on_line(tuple(middle - half), tuple(middle + half), 40, seed=seed)  # type: ignore[arg-type]
+    peaks = on_line(tuple(middle - half), tuple(middle + half), 40, seed=seed)
     (line,) = find_lines(peaks, RESOLUTION)
     found = ends_of(line)
     expected = np.sort(np.stack([middle - half, middle + half])[:, 0])

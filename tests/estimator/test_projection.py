@@ -64,7 +64,7 @@ def test_folding_is_the_thesis_rotation_about_the_point_where_the_ray_meets_the_
     normal = normal * np.sign(-ray @ normal or 1.0)  # towards the array
     incidence = float(np.arccos(np.clip(-ray @ normal, 0, 1)))
     assume(incidence < np.radians(89))
-    mirror = wall(tuple(hit - 0.3 * along), tuple(hit + 0.3 * along))  # type: ignore[arg-type]
+    mirror = wall(tuple(hit - 0.3 * along), tuple(hit + 0.3 * along))
     found = launched(aoa_deg, 0.8 + behind, [mirror])
     assert found.walls == (0,)
     # It turns from the ray towards the wall's normal, on the shorter way.
@@ -80,7 +80,8 @@ def test_folding_is_the_thesis_rotation_about_the_point_where_the_ray_meets_the_
 def test_the_thesis_user_is_found_over_its_wall() -> None:
     found = launched(90.0, 1.8, [SLANTED])
     np.testing.assert_allclose(found.position, [1.0, 0.8, 0.0], atol=1e-12)
-    np.testing.assert_allclose(found.path, [[0, 0, 0], [0, 0.8, 0], [1.0, 0.8, 0]], atol=1e-12)
+    expected = np.array([[0.0, 0.0, 0.0], [0.0, 0.8, 0.0], [1.0, 0.8, 0.0]])
+    np.testing.assert_allclose(found.path, expected, atol=1e-12)
     assert found.margin == pytest.approx(0.2 * np.sqrt(2))
 
 
@@ -131,7 +132,7 @@ def test_over_two_walls_the_path_is_that_of_the_image_of_the_image(
     def plate(centre: tuple[float, float], angle_deg: float) -> Wall:
         half = 0.35 * np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
         middle = np.array(centre)
-        return wall(tuple(middle - half), tuple(middle + half))  # type: ignore[arg-type]
+        return wall(tuple(middle - half), tuple(middle + half))
 
     walls = [plate((0.9, 0.8), second_deg), plate((offset, 0.8), first_deg)]
     user = np.array([x, -0.28, 0.0])

@@ -1,5 +1,6 @@
 import json
 import shutil
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import estimator.storage
 from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
 from estimator.storage import (
     is_store,
@@ -19,7 +19,7 @@ from estimator.storage import (
 
 RNG = np.random.default_rng(11)
 POSITIONS = np.stack([np.linspace(-0.06, 0.06, 5), np.zeros(5), np.full(5, 1.2)], axis=-1)
-ELEMENTS = POSITIONS[1:] + [0.0, 0.01, 0.0]
+ELEMENTS = POSITIONS[1:] + np.array([0.0, 0.01, 0.0])
 FREQUENCIES = np.linspace(220e9, 295e9, 7)
 
 
@@ -93,7 +93,8 @@ def test_what_is_written_is_read_back_bit_for_bit(measurement: Measurement, tmp_
 def test_either_part_may_be_missing(
     left_out: str, measurement: Measurement, tmp_path: Path
 ) -> None:
-    part = replace(measurement, **{"echo": {"echo": None}, "uplinks": {"uplinks": ()}}[left_out])
+    without: dict[str, Any] = {"echo": None} if left_out == "echo" else {"uplinks": ()}
+    part = replace(measurement, **without)
     write_measurement(tmp_path / "a.zarr", part)
     assert_same(read_measurement(tmp_path / "a.zarr"), part)
 
@@ -394,7 +395,7 @@ def test_a_write_that_fails_leaves_what_was_there_and_nothing_else(
     store = tmp_path / "a.zarr"
     write_measurement(store, measurement, truth=truth)
     before = everything_in(tmp_path)
-    really_write = xr.Dataset.to_zarr
+    really_write: Any = xr.Dataset.to_zarr
 
     def full(dataset: xr.Dataset, *args: Any, group: str | None = None, **options: Any) -> object:
         if (group or "root") == failing:
@@ -436,7 +437,7 @@ def test_a_folder_that_cannot_be_written_says_so(
     def refused(*args: object, **options: object) -> str:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(estimator.storage.tempfile, "mkdtemp", refused)
+    monkeypatch.setattr(tempfile, "mkdtemp", refused)
     with pytest.raises(PermissionError):
         write_measurement(tmp_path / "a.zarr", measurement)
     assert everything_in(tmp_path) == set()

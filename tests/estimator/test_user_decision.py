@@ -91,7 +91,8 @@ def test_a_reflected_path_is_folded_to_the_user() -> None:
     assert found.position is not None
     assert found.path is not None
     np.testing.assert_allclose(found.position, user, atol=1e-9)
-    np.testing.assert_allclose(found.path, [[0, 0, 0], [0, 0.8, 0], user], atol=1e-9)
+    expected = np.array([[0.0, 0.0, 0.0], [0.0, 0.8, 0.0], user])
+    np.testing.assert_allclose(found.path, expected, atol=1e-9)
     assert found.aoa == pytest.approx(np.pi / 2)
     assert found.path_length == pytest.approx(1.8)
 
