@@ -12,6 +12,7 @@ from estimator.estimate import Estimate, Image
 from estimator.measurement import Measurement
 from mmslam import output
 from validation import figures, views
+from validation.resolution_bars import draw_resolution_bars
 from validation.truth import Truth
 
 DOTS_PER_INCH = 150
@@ -89,7 +90,7 @@ def image_figure(
     figures.overlay_mirrors(ax, estimate.mirrors, line=corrected)
     figures.overlay_array(ax, positions, colour=figures.ON_DARK)
     if frequencies is not None:
-        figures.overlay_resolution(ax, view, _brightest_point(image), positions, frequencies)
+        draw_resolution_bars(ax, view, _brightest_point(image), positions, frequencies)
     if corrected:
         figures.overlay_targets(ax, estimate.targets)
         figures.overlay_paths(ax, estimate.users, width=1.2)

@@ -10,7 +10,6 @@ from matplotlib.patches import Ellipse
 from matplotlib.ticker import MaxNLocator
 
 from estimator.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
-from estimator.resolution import cell_at
 from validation.views import View, brightest_plane
 
 FLOOR_DB = -40.0
@@ -136,52 +135,6 @@ def overlay_paths(ax: Axes, users: Iterable[UserEstimate], *, width: float = 1.6
     for user in users:
         if user.path is not None:
             ax.plot(user.path[:, 0], user.path[:, 1], color=PATH, lw=width, zorder=3)
-    return ax
-
-
-def overlay_resolution(
-    ax: Axes,
-    view: View,
-    point: Float[np.ndarray, " 3"],
-    positions: Float[np.ndarray, "positions 3"],
-    frequencies: Float[np.ndarray, " freqs"],
-    *,
-    cells: int = 10,
-) -> Axes:
-    """Draw bars of so many -3 dB resolution cells in a corner: along range, and across.
-
-    Parameters
-    ----------
-    ax, view
-        The axes and what they show.
-    point
-        Where the cell is meant: across range it grows with distance. [m]
-    positions, frequencies
-        Of the untapered echo. [m], [Hz]
-    cells
-        Cells in a bar; one alone is too short to be seen.
-    """
-    cell = cell_at(point, positions=positions, frequencies=frequencies)
-    x = view.right - 0.05 * (view.right - view.left) - cells * cell.across
-    y = view.bottom + 0.1 * (view.top - view.bottom)
-    ax.plot(
-        [x + cells * cell.across, x, x],
-        [y, y, y + cells * cell.along_range],
-        color=ON_DARK,
-        lw=1.5,
-        solid_joinstyle="miter",
-    )
-    ax.annotate(
-        f"{cells} cells: {cells * cell.along_range * 1e3:.3g} mm along range,\n"
-        f"{cells * cell.across * 1e3:.3g} mm across at {np.linalg.norm(point):.2f} m",
-        (x + cells * cell.across, y),
-        xytext=(0, -4),
-        textcoords="offset points",
-        color=ON_DARK,
-        ha="right",
-        va="top",
-        fontsize=8,
-    )
     return ax
 
 

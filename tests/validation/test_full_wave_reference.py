@@ -4,6 +4,7 @@ import runpy
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,10 @@ from validation.full_wave_reference import (
 )
 
 REFERENCE = Path(__file__).parent.parent / "data" / "rough_wall_decimated.npz"
+
+
+def save(path: Path, arrays: dict[str, Any]) -> None:
+    np.savez(path, **arrays)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +48,7 @@ def test_another_wall_does_not_agree(arrays: dict[str, np.ndarray], tmp_path: Pa
     flat = wall - heights[:, None] * np.array([1, -1, 0]) / np.sqrt(2)
     turned = flat + heights[::-1, None] * np.array([1, -1, 0]) / np.sqrt(2)
     changed = {**arrays, "wall_profile": turned}
-    np.savez(tmp_path / "other.npz", **changed)
+    save(tmp_path / "other.npz", changed)
     echo = compare_with_full_wave(tmp_path / "other.npz")[0]
     assert echo.name == "echo"
     assert not echo.passed
@@ -64,11 +69,8 @@ def test_the_command_says_fail_and_fails(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    np.savez(
-        tmp_path / "loud.npz",
-        echo=2 * arrays["echo"],
-        **{name: arrays[name] for name in ("wall_profile", "aperture_position", "frequency")},
-    )
+    geometry = {name: arrays[name] for name in ("wall_profile", "aperture_position", "frequency")}
+    save(tmp_path / "loud.npz", {**geometry, "echo": 2 * arrays["echo"]})
     monkeypatch.setattr(sys, "argv", ["full_wave_reference", str(tmp_path / "loud.npz")])
     assert main() == 1
     printed = capsys.readouterr().out
@@ -146,7 +148,7 @@ def test_a_reference_without_an_array_is_refused_by_its_name(
     missing: str, message: str, arrays: dict[str, np.ndarray], tmp_path: Path
 ) -> None:
     path = tmp_path / "part.npz"
-    np.savez(path, **{name: values for name, values in arrays.items() if name != missing})
+    save(path, {name: values for name, values in arrays.items() if name != missing})
     with pytest.raises(MeasurementError, match=message):
         read_reference(path)
 
@@ -156,7 +158,7 @@ def test_a_reference_without_anything_to_compare_is_refused(
 ) -> None:
     path = tmp_path / "geometry.npz"
     names = ("wall_profile", "aperture_position", "frequency")
-    np.savez(path, **{name: arrays[name] for name in names})
+    save(path, {name: arrays[name] for name in names})
     with pytest.raises(MeasurementError, match=r"echo, uplink_isotropic or uplink_beam"):
         read_reference(path)
 
@@ -165,7 +167,7 @@ def test_arrays_that_do_not_fit_each_other_are_refused(
     arrays: dict[str, np.ndarray], tmp_path: Path
 ) -> None:
     path = tmp_path / "short.npz"
-    np.savez(path, **{**arrays, "echo": arrays["echo"][:, :-1]})
+    save(path, {**arrays, "echo": arrays["echo"][:, :-1]})
     with pytest.raises(MeasurementError, match=r"'echo' has shape"):
         compare_with_full_wave(path)
 
