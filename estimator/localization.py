@@ -92,7 +92,12 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         notes.append("no echo was measured, so nothing is known of mirrors")
     else:
         started = time.perf_counter()
-        local_echo = replace(echo, positions=frame.to_local(echo.positions))
+        apart = echo.transmit_positions
+        local_echo = replace(
+            echo,
+            positions=frame.to_local(echo.positions),
+            transmit_positions=None if apart is None else frame.to_local(apart),
+        )
         looked_over = survey(local_echo)
         lines = detect_mirrors(local_echo, looked_over)
         loose = loose_peaks(local_echo, looked_over, lines)

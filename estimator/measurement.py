@@ -65,6 +65,11 @@ class Measurement:
 
     def __post_init__(self) -> None:
         """Refuse a measurement without data."""
+        length = float(np.linalg.norm(self.boresight))
+        if not abs(length - 1) < 1e-6:
+            raise MeasurementError(
+                f"boresight = {self.boresight.tolist()} has length {length:g}; give a unit vector"
+            )
         if self.echo is None and not self.uplinks:
             raise MeasurementError("the measurement has neither 'echo' nor 'uplink': give one")
         grids = [uplink.frequencies for uplink in self.uplinks]

@@ -31,6 +31,9 @@ CELLS_PER_BLOCK = 14.0
 """Cells in a block. A cell's speckle pushes its neighbours' part of the line the other way:
 over 26 realisations, blocks of 3 cells gave 2.8 times the true deviation of the angle, 6 cells
 2.3 times, 12 cells 1.6 times, 20 cells 1.5 times, but from 8 blocks only."""
+FEWEST_BLOCKS = 8
+"""Blocks of a short wall: fewer give a covariance that is singular by chance; shorter ones only
+overstate it."""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
 CELLS_CUT = 2.0
@@ -259,7 +262,9 @@ def _summit(
     unit = np.linspace(-1, 1, TRIALS)
     points = _trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
     magnitude = np.abs(focus(points))
-    count = int(np.clip(length / (CELLS_PER_BLOCK * _cell_along(start, end, resolution)), 4, 40))
+    count = int(
+        np.clip(length / (CELLS_PER_BLOCK * _cell_along(start, end, resolution)), FEWEST_BLOCKS, 40)
+    )
     blocks = np.stack(
         [part.sum(axis=-1) for part in np.array_split(magnitude, count, axis=-1)], axis=-1
     ).reshape(-1, count)

@@ -45,7 +45,8 @@ class Path:
     def unfolded(self) -> float | None:
         """A path length beyond the unambiguous one that fits the curvature, if one does. [m]."""
         longer = [self.wave.path_length + turns * self.unambiguous for turns in (1, 2, 3)]
-        return next((length for length in longer if self._agrees_with(length)), None)
+        nearest = min(longer, key=lambda length: abs(1 / length - 1 / self.free.radius))
+        return nearest if self._agrees_with(nearest) else None
 
     def _agrees_with(self, length: float) -> bool:
         deviation = np.sqrt(self.free.covariance[2, 2]) / self.free.radius**2
@@ -65,7 +66,8 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
 
     Returns
     -------
-    The waves, strongest first; each holds at least :data:`LEAST_SHARE` of the energy.
+    The waves in the order in which they were taken out; each holds at least
+    :data:`LEAST_SHARE` of the energy.
     """
     noise = noise_variance(uplink)
     energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
@@ -115,7 +117,9 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap) -> tuple[Path, ...]:
 def noise_variance(uplink: Uplink) -> float:
     """Estimate the noise in each sample from the delays at which nothing arrives.
 
-    The median over all delays is blind to the few that hold signal.
+    The median over all delays is blind to the few that hold signal; a Hann window keeps the
+    signal's sidelobes out of the others.
     """
-    delays = np.abs(np.fft.ifft(uplink.samples, axis=1)) ** 2
-    return float(np.median(delays)) / float(np.log(2)) * uplink.frequencies.size
+    window = np.hanning(uplink.frequencies.size + 2)[1:-1]
+    delays = np.abs(np.fft.fft(uplink.samples * window, axis=1)) ** 2
+    return float(np.median(delays)) / float(np.log(2)) / float(np.sum(window**2))

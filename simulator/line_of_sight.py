@@ -27,7 +27,8 @@ def in_line_of_sight(
         scene, max_depth=0, los=True, synthetic_array=False, samples_per_src=1, refraction=False
     )
     # [receiver, antenna, transmitter, antenna, path]
-    seen = np.asarray(paths.valid.numpy(), dtype=bool).reshape(len(elements), -1).any(axis=-1)
+    valid = np.asarray(paths.valid.numpy(), dtype=bool).reshape(len(elements), -1)
+    seen = np.asarray(valid.any(axis=-1))
     # Sionna RT leaves out legs shorter than 1 cm.
     near = np.linalg.norm(elements - user, axis=-1) < SHORTEST_LEG
     seen[near] = ~blocked(scene, np.broadcast_to(user, elements[near].shape), elements[near])

@@ -8,11 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 from scipy.spatial.transform import Rotation
 
 from estimator.estimate import Estimate, UserEstimate
 from estimator.localization import locate
 from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
+from estimator.projection import mirrored
 from scenes.scenario import parse_scenario
 from simulator.simulation import simulate
 
@@ -114,6 +116,43 @@ def test_several_users_each_have_an_answer(room: Room) -> None:
     assert error_of(estimate.users[1], np.array([-0.1, 0.15, 0.0])) <= 1e-4
 
 
+def test_a_wall_seen_through_another_is_folded_and_reflects_too(world: Any) -> None:
+    # The second wall, 20 cm at 100° through (0.25, 0.3), shows in the first as a ghost behind it.
+    frequencies = np.linspace(220e9, 295e9, 401)  # 0.8 m of unambiguous range
+    rng = np.random.default_rng(1)
+    first = world.rough_line((0.0, 0.3), 45.0, 0.2, rng)
+    second = world.rough_line((0.25, 0.3), 100.0, 0.2, rng)
+    ghost = mirrored(second, WALL[0], WALL[1])
+    parts = [
+        world.echo(points, rng, frequencies=frequencies, snr_db=200.0) for points in (first, ghost)
+    ]
+    samples = world.noisy(parts[0].samples + 3 * parts[1].samples, 20.0, rng)
+    echo = replace(parts[0], samples=samples)
+    # Up, to the right along y = 0.3, and back at 200°: 0.3 + 0.25 + 0.15 m.
+    user = np.array([0.25, 0.3, 0.0]) - 0.15 * np.array(
+        [np.cos(np.radians(20)), np.sin(np.radians(20)), 0.0]
+    )
+    image = np.array([0.0, 0.7, 0.0])
+    pilot = Uplink(
+        samples=world.noisy(world.pilot(image, frequencies=frequencies), 20.0, rng),
+        positions=echo.positions,
+        frequencies=frequencies,
+        user="ann",
+    )
+    estimate = locate(Measurement(echo=echo, uplinks=(pilot,), clock_offset=0.0))
+    assert [mirror.seen_through for mirror in estimate.mirrors] == [(), (0,)]
+    folded = estimate.mirrors[1]
+    along = np.array([np.cos(np.radians(100)), np.sin(np.radians(100)), 0.0])
+    normal = np.array([along[1], -along[0], 0.0])
+    middle = 0.5 * (folded.start + folded.end)
+    assert abs((middle - [0.25, 0.3, 0.0]) @ normal) <= 2e-4
+    assert abs((middle - [0.25, 0.3, 0.0]) @ along) <= 7e-3  # a cell across the ray
+    assert abs(folded.normal @ along) <= 3e-3  # its angle, and twice that of the first
+    answer = only(estimate)
+    assert (answer.status, answer.bounces) == ("found", 2)
+    assert error_of(answer, user) <= 1.5e-3
+
+
 def test_the_images_show_the_wall_and_nothing_behind_it(
     hidden: tuple[Measurement, Estimate],
 ) -> None:
@@ -155,9 +194,16 @@ def moved(
         return np.asarray(positions @ turn.T + shift)
 
     echo = measurement.echo
+    if echo is not None:
+        apart = echo.transmit_positions
+        echo = replace(
+            echo,
+            positions=placed(echo.positions),
+            transmit_positions=None if apart is None else placed(apart),
+        )
     return replace(
         measurement,
-        echo=None if echo is None else replace(echo, positions=placed(echo.positions)),
+        echo=echo,
         uplinks=tuple(replace(one, positions=placed(one.positions)) for one in measurement.uplinks),
         boresight=turn @ measurement.boresight,
     )
@@ -206,6 +252,32 @@ def test_an_array_on_a_tripod_images_the_plane_at_its_own_height(
     # 32-bit phases against another origin: the promise of back-projection.
     assert np.abs(high.raw_image.values).max() == pytest.approx(peak, rel=1e-2)
     assert high.raw_image.grid.z[0] == pytest.approx(1.2)
+
+
+def test_transmitters_that_stand_apart_move_with_the_array(world: Any) -> None:
+    positions = world.array()
+    transmitters = positions + np.array([0.03, 0.0, 0.0])
+    rng = np.random.default_rng(0)
+    points = world.rough_line((0.0, 0.3), 45.0, 0.2, rng, count=400)
+    strengths = rng.standard_normal(400) + 1j * rng.standard_normal(400)
+    samples = []
+    for ends in zip(positions, transmitters, strict=True):
+        legs = [np.linalg.norm(points - end, axis=-1) for end in ends]
+        phase = np.outer(legs[0] + legs[1], 2 * np.pi * world.band / speed_of_light)
+        samples.append(strengths / (legs[0] * legs[1]) @ np.exp(-1j * phase))
+    echo = Echo(
+        samples=world.noisy(np.array(samples), 20.0, rng),
+        positions=positions,
+        frequencies=world.band,
+        transmit_positions=transmitters,
+    )
+    turn, shift = Rotation.from_euler("z", 0.7).as_matrix(), np.array([1.0, 2.0, 0.0])
+    still = Measurement(echo=echo, uplinks=())
+    (before,), (after,) = (locate(one).mirrors for one in (still, moved(still, turn, shift)))
+    along = (before.end - before.start) / np.linalg.norm(before.end - before.start)
+    assert abs(along @ [1, -1, 0]) <= 2e-3  # 45°, to 0.1°
+    np.testing.assert_allclose(after.start, turn @ before.start + shift, atol=1e-6)
+    np.testing.assert_allclose(after.end, turn @ before.end + shift, atol=1e-6)
 
 
 # The clock

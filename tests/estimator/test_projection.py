@@ -62,14 +62,14 @@ def test_folding_is_the_thesis_rotation_about_the_point_where_the_ray_meets_the_
     hit = 0.8 * ray
     normal = np.array([along[1], -along[0]])
     normal = normal * np.sign(-ray @ normal or 1.0)  # towards the array
-    incidence = float(np.arccos(np.clip(-ray @ normal, 0, 1)))
+    towards = ray[0] * normal[1] - ray[1] * normal[0]
+    incidence = float(np.arctan2(abs(towards), -ray @ normal))
     assume(incidence < np.radians(89))
     mirror = wall(tuple(hit - 0.3 * along), tuple(hit + 0.3 * along))
     found = launched(aoa_deg, 0.8 + behind, [mirror])
     assert found.walls == (0,)
     # It turns from the ray towards the wall's normal, on the shorter way.
-    sense = np.sign(ray[0] * normal[1] - ray[1] * normal[0]) or 1.0
-    turn = sense * (np.pi - 2 * incidence)
+    turn = np.copysign(np.pi - 2 * incidence, towards)
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     straight_on = (0.8 + behind) * ray
     expected = hit + rotation @ (straight_on - hit)
