@@ -74,15 +74,24 @@ def scenes(
         str | None, typer.Argument(help="A built-in name, or the path of a TOML file.")
     ] = None,
     overrides: Overrides = None,
-    show: Annotated[bool, typer.Option("--show", help="Draw the plan of NAME as PNG.")] = False,
+    show: Annotated[
+        bool,
+        typer.Option("--show", help="Draw NAME, from above and in 3-D, with its specular paths."),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILE.png", help="Where to draw it [out/NAME.png]."),
     ] = None,
     export: Annotated[
         Path | None,
-        typer.Option("--export", metavar="DIR", help="Write NAME, or all, as TOML files to DIR."),
+        typer.Option(
+            "--export",
+            metavar="DIR",
+            help="Write NAME to DIR: TOML, and Mitsuba XML with PLY meshes for Sionna and Blender. "
+            "Without NAME, the TOML of all.",
+        ),
     ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the roughness in the exported facets.")] = 0,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of scenario files.")
     ] = False,
@@ -102,7 +111,11 @@ def scenes(
         else:
             scenario = load_scenario(name, overrides or [])
             commands.show_scenario(
-                scenario, picture=_picture(show, out, scenario.name), export=export, as_json=as_json
+                scenario,
+                picture=_picture(show, out, scenario.name),
+                export=export,
+                seed=seed,
+                as_json=as_json,
             )
 
 
@@ -199,6 +212,44 @@ def import_(
 
         measurement = import_to_file(source, uplink=uplink, path=output)
         _print_written(output, measurement, as_json)
+
+
+@app.command()
+def design(
+    scenario: Annotated[
+        str,
+        typer.Argument(metavar="[SCENARIO]", help="Whose radio and array: a name or a TOML file."),
+    ] = "slam_2d",
+    start_ghz: Annotated[float | None, typer.Option(help="Lower end of the band.")] = None,
+    stop_ghz: Annotated[float | None, typer.Option(help="Upper end of the band.")] = None,
+    points: Annotated[int | None, typer.Option(help="Frequencies in the band.")] = None,
+    elements: Annotated[int | None, typer.Option(help="Positions of the linear array.")] = None,
+    spacing_mm: Annotated[float | None, typer.Option(help="Between positions.")] = None,
+    distance_m: Annotated[float, typer.Option(help="Of target and user.")] = 1.0,
+    angle_deg: Annotated[float, typer.Option(help="Largest angle off broadside.")] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Print resolutions, unambiguous ranges, needed steps and field regions of a radio."""
+    with told_clearly():
+        from mmslam.design import design_document, design_lines, design_rows, scenario_radio
+        from scenes.library import load_scenario
+
+        given = {
+            "start_ghz": start_ghz,
+            "stop_ghz": stop_ghz,
+            "points": points,
+            "elements": elements,
+            "spacing_mm": spacing_mm,
+        }
+        options = scenario_radio(load_scenario(scenario))
+        options |= {key: value for key, value in given.items() if value is not None}
+        options |= {"distance_m": distance_m, "angle_deg": angle_deg}
+        rows = design_rows(**options)
+        if as_json:
+            _print_json(design_document(options, rows))
+            return
+        for line in design_lines(rows):
+            typer.echo(line)
 
 
 @app.command()

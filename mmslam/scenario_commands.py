@@ -5,6 +5,7 @@ from pathlib import Path
 
 import typer
 
+from mmslam.failures import stdout_kept_clean
 from mmslam.output import OutputError
 from scenes.library import load_scenario, scenario_names, scenario_to_toml
 from scenes.scenario import Scenario
@@ -14,7 +15,7 @@ def list_scenarios(*, export: Path | None, as_json: bool) -> None:
     """Print the built-in scenarios, and export all of them if a folder is given."""
     scenarios = [load_scenario(name, []) for name in scenario_names()]
     for scenario in scenarios if export else ():
-        _export(scenario, export)
+        _export_toml(scenario, export)
     if as_json:
         listed = [{"name": found.name, "title": found.title} for found in scenarios]
         typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
@@ -25,7 +26,7 @@ def list_scenarios(*, export: Path | None, as_json: bool) -> None:
 
 
 def show_scenario(
-    scenario: Scenario, *, picture: Path | None, export: Path | None, as_json: bool
+    scenario: Scenario, *, picture: Path | None, export: Path | None, seed: int, as_json: bool
 ) -> None:
     """Print a scenario, or draw it, or export it.
 
@@ -36,7 +37,9 @@ def show_scenario(
     picture
         PNG file for its plan; its path is printed instead of the scenario.
     export
-        Folder for its TOML file; likewise.
+        Folder for its TOML, XML and PLY files; likewise.
+    seed
+        Of the roughness in the exported facets.
     as_json
         Whether the scenario is printed as JSON, not as TOML.
     """
@@ -44,7 +47,8 @@ def show_scenario(
     if picture is not None:
         written.append(_draw(scenario, picture))
     if export is not None:
-        written.append(_export(scenario, export))
+        written.append(_export_toml(scenario, export))
+        written += _export_meshes(scenario, export, seed)
     if as_json:
         document = json.loads(scenario.model_dump_json())  # infinity becomes null
         if written:
@@ -57,16 +61,30 @@ def show_scenario(
         typer.echo(scenario_to_toml(scenario).rstrip())
 
 
-def _export(scenario: Scenario, folder: Path | None) -> Path:
+def _export_toml(scenario: Scenario, folder: Path | None) -> Path:
     assert folder is not None
     path = folder / f"{scenario.name}.toml"
-    text = scenario_to_toml(scenario)
-    if path.exists() and path.read_text(encoding="utf-8") != text:
+    _write_new(path, scenario_to_toml(scenario).encode("utf-8"))
+    return path
+
+
+def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:
+    with stdout_kept_clean():
+        from simulator.scene_export import exported_files
+
+        written = []
+        for name, content in exported_files(scenario, seed=seed):
+            _write_new(folder / name, content)
+            written.append(folder / name)
+    return written
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    if path.exists() and path.read_bytes() != content:
         raise OutputError(
             f"{path} exists with other content; move it away or choose another folder"
         )
-    _write(path, text.encode("utf-8"))
-    return path
+    _write(path, content)
 
 
 def _draw(scenario: Scenario, path: Path) -> Path:
@@ -74,12 +92,18 @@ def _draw(scenario: Scenario, path: Path) -> Path:
 
     from matplotlib.figure import Figure
 
-    from mmslam.pictures import DOTS_PER_INCH
-    from validation.scenario_plan import draw_scenario
+    with stdout_kept_clean():
+        from mmslam.pictures import DOTS_PER_INCH
+        from simulator.scenario_paths import scenario_paths
+        from validation.scenario_plan import draw_scenario
+        from validation.scenario_view import draw_view
 
-    figure = Figure(figsize=(8, 7), layout="constrained")
-    ax = draw_scenario(figure.subplots(), scenario)
-    ax.set_title(scenario.title or scenario.name)
+        paths = scenario_paths(scenario)
+    figure = Figure(figsize=(14, 6.6), layout="constrained")
+    columns = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
+    draw_scenario(figure.add_subplot(columns[0]), scenario, paths)
+    draw_view(figure.add_subplot(columns[1], projection="3d"), scenario, paths)
+    figure.suptitle(scenario.title or scenario.name)
     drawn = io.BytesIO()
     figure.savefig(drawn, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
     _write(path, drawn.getvalue())

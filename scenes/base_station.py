@@ -70,6 +70,11 @@ class BaseStation(Checked):
         90.0, description="the azimuth of the boresight from +x; the axis is 90° less [degree]"
     )
     antenna: Antenna = Field(default_factory=Isotropic, description="the elements' antenna")
+    transmit_offset_m: Position | None = Field(
+        None,
+        description="from each element to the antenna that transmits its echo; without, the "
+        "element itself [m]",
+    )
 
     @model_validator(mode="after")
     def _spacing_fits_elements(self) -> "BaseStation":
@@ -114,6 +119,15 @@ class BaseStation(Checked):
         offsets = along[:, None, None] * self.axis + up[None, :, None] * np.array([0.0, 0.0, 1.0])
         positions: np.ndarray = np.asarray(self.position_m) + offsets.reshape(-1, 3)
         return positions
+
+    @property
+    def transmit_offset(self) -> Float[np.ndarray, " 3"] | None:
+        """From each element to the antenna that transmits its echo; None: itself [m].
+
+        What leaks from one to the other is not modelled: a measured sweep is calibrated for it.
+        """
+        offset = self.transmit_offset_m
+        return None if offset is None else np.array(offset, dtype=np.float64)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from scenes.objects import (
     LARGEST_RELATIVE_RMS,
     Body,
@@ -100,9 +102,21 @@ def mesh_facet_count(area: float, faces: int, spacing: float) -> int:
 
 
 def facet_problems(
-    objects: Mapping[str, Plate | Cylinder | Box | MeshFile], shortest_wavelength: float
+    objects: Mapping[str, Plate | Cylinder | Box | MeshFile],
+    shortest_wavelength: float,
+    *,
+    flat: bool = False,
 ) -> list[str]:
     """Find rough surfaces that cannot be, and facets that would not fit into memory.
+
+    Parameters
+    ----------
+    objects
+        By name.
+    shortest_wavelength
+        At the highest frequency of the radio. [m]
+    flat
+        Whether the scene has two dimensions, so that meshes become lines.
 
     Returns
     -------
@@ -116,7 +130,11 @@ def facet_problems(
             from scenes.mesh_file import placed_mesh
 
             mesh = placed_mesh(body)
-            counts[name] = mesh_facet_count(float(mesh.area), len(mesh.faces), spacing)
+            counts[name] = len(mesh.faces)
+            if body.facets == "cut":
+                counts[name] = mesh_facet_count(float(mesh.area), len(mesh.faces), spacing)
+            if flat:
+                counts[name] = _mesh_line_count(body, spacing)
         else:
             counts[name] = facet_count(body, spacing)
             found += _roughness_problems(name, body)
@@ -131,6 +149,15 @@ def facet_problems(
             f"objects.{name}.roughness.correlation_mm (or set roughness.rms_mm = 0: smooth)"
         )
     return found
+
+
+def _mesh_line_count(body: MeshFile, spacing: float) -> int:
+    from scenes.mesh_lines import mesh_segments
+
+    starts, ends = mesh_segments(body)
+    if body.facets == "file":
+        return len(starts)
+    return len(starts) + math.ceil(float(np.linalg.norm(ends - starts, axis=-1).sum()) / spacing)
 
 
 def _roughness_problems(name: str, body: Plate | Cylinder | Box) -> list[str]:

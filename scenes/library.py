@@ -7,6 +7,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from scenes.geometry import Geometry
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from scenes.scenario_error import did_you_mean, shown
 from scenes.toml_writer import toml_text
@@ -14,7 +15,11 @@ from scenes.toml_writer import toml_text
 LARGEST_FILE = 10 * 2**20
 """Largest scenario file that is read [byte]."""
 
-_BEGIN = {"objects": "kind", "users": "position_m"}  # what a new table cannot do without
+_BEGIN = {
+    "objects": "kind",
+    "users": "position_m",
+    "points": "position_m",
+}  # what a new table cannot do without
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -45,7 +50,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     source: Traversable
     if name_or_path in scenario_names():
-        source, folder = _folder() / f"{name_or_path}.toml", None
+        source, folder = _folder() / f"{name_or_path}.toml", Path(str(_folder()))
     elif _is_path(name_or_path):
         source = Path(name_or_path)
         folder = source.parent
@@ -57,8 +62,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     data = _tables(source, name_or_path)
     data.setdefault("name", source.name.removesuffix(".toml"))
     _override(data, overrides)
-    if folder is not None:
-        _resolve_files(data, folder)
+    _resolve_files(data, folder)
     try:
         return parse_scenario(data)
     except ScenarioError as error:
@@ -89,6 +93,8 @@ def scenario_schema() -> dict[str, Any]:
     schema = Scenario.model_json_schema()
     # JSON knows no infinity; a scenario without noise simply leaves the key out.
     del schema["$defs"]["Noise"]["properties"]["snr_db"]["default"]
+    # Read, and turned into objects, before the scenario itself is.
+    schema["properties"]["geometry"] = Geometry.model_json_schema()
     return schema
 
 
@@ -174,8 +180,14 @@ def _literal(text: str) -> object:
 
 
 def _resolve_files(data: dict[str, Any], folder: Path) -> None:
-    """Make paths relative to the scenario's file absolute: meshes, tables of permittivity."""
-    for body in _group(data, "objects").values():
+    """Make paths relative to the scenario's file absolute: scenes, meshes, permittivities."""
+    geometry = data.get("geometry")
+    if isinstance(geometry, dict) and isinstance(geometry.get("file"), str) and geometry["file"]:
+        geometry["file"] = str((folder / geometry["file"]).resolve())
+    bodies = list(_group(data, "objects").values())
+    for group in ("materials", "objects"):
+        bodies += _group(geometry if isinstance(geometry, dict) else {}, group).values()
+    for body in bodies:
         tables = [body, body.get("material")] if isinstance(body, dict) else []
         for table in tables:
             if isinstance(table, dict) and isinstance(table.get("file"), str) and table["file"]:

@@ -45,10 +45,9 @@ TEXTURES: Mapping[str, Texture] = {
     "drywall": Texture(rms_mm=0.02, correlation_mm=0.3),
     "cardboard": Texture(rms_mm=0.05, correlation_mm=0.3),
 }
-"""Roughness of named materials where an object gives none; all others are smooth. There is no
-settled published value at these frequencies: painted board and corrugated carton, chosen so
-that drywall's diffuse echo stands about as far below its mirror-like one as measured at
-300 GHz. ``roughness.rms_mm = 0`` makes a smooth one."""
+"""Roughness of named materials where an object gives none; all others are smooth. No settled
+values are published at these frequencies: these are parameters to be swept, and
+``roughness.rms_mm = 0`` makes a smooth one."""
 
 
 def _name(value: str) -> str:

@@ -57,6 +57,9 @@ def placed_mesh(body: MeshFile) -> trimesh.Trimesh:
 def _placed(body: MeshFile, changed: int, size: int) -> trimesh.Trimesh:
     mesh = _read(body.file)
     axes = np.stack([body.tangent, body.across, np.array([0.0, 0.0, 1.0])])
+    if body.matrix is not None:
+        affine = np.array(body.matrix).reshape(3, 4)
+        mesh.vertices = np.asarray(mesh.vertices) @ affine[:, :3].T + affine[:, 3]
     mesh.vertices = body.centre + body.scale * np.asarray(mesh.vertices) @ axes
     if np.abs(mesh.vertices).max() > FARTHEST:
         raise ScenarioError(
@@ -115,7 +118,7 @@ def mesh_distance(
             closest = trimesh.triangles.closest_point(triangles, repeated)  # type: ignore[no-untyped-call]
             gap = float(np.linalg.norm(closest - points[index], axis=-1).min())
             distances[index] = gap if gap <= farthest else np.inf
-    inside = _inside(mesh, points)
+    inside = _inside(body, points)
     return np.where(inside, -np.minimum(distances, farthest), distances)
 
 
@@ -123,17 +126,16 @@ def mesh_contains(
     body: MeshFile, points: Float[np.ndarray, "points 3"], *, deeper_than: float
 ) -> Bool[np.ndarray, " points"]:
     """Tell which points lie inside a watertight mesh, and not just below its surface."""
-    if not _inside(placed_mesh(body), points).any():
+    if not _inside(body, points).any():
         return np.zeros(len(points), dtype=bool)
     return mesh_distance(body, points, farthest=2 * deeper_than) < -deeper_than
 
 
-def _inside(
-    mesh: trimesh.Trimesh, points: Float[np.ndarray, "points 3"]
-) -> Bool[np.ndarray, " points"]:
+def _inside(body: MeshFile, points: Float[np.ndarray, "points 3"]) -> Bool[np.ndarray, " points"]:
     """Tell points inside by the solid angle that the surface subtends: 4π inside, 0 outside."""
+    mesh = placed_mesh(body)
     inside = np.zeros(len(points), dtype=bool)
-    if not mesh.is_watertight:
+    if body.hollow or not mesh.is_watertight:
         return inside
     low, high = mesh.bounds
     candidates = np.flatnonzero(((points >= low) & (points <= high)).all(axis=-1))

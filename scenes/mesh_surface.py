@@ -27,8 +27,8 @@ SHARPEST_MEAN = 0.05
 
 
 def mesh_is_closed(body: MeshFile) -> bool:
-    """Tell whether a mesh is watertight, so that only its outer side is seen."""
-    return bool(placed_mesh(body).is_watertight)
+    """Tell whether a mesh is a watertight solid, so that only its outer side is seen."""
+    return not body.hollow and bool(placed_mesh(body).is_watertight)
 
 
 def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
@@ -40,6 +40,9 @@ def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
         If it would not fit into memory, or a rough mesh has faces too small to be rough.
     """
     mesh = placed_mesh(body)
+    if body.facets == "file":
+        vertices, cells = np.array(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, int)
+        return Shape(vertices=vertices, mean_vertices=vertices, cells=cells)
     count = mesh_facet_count(float(mesh.area), len(mesh.faces), spacing)
     if count * BYTES_PER_FACET > MOST_BYTES:
         raise ScenarioError(

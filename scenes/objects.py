@@ -146,8 +146,11 @@ class Box(Body):
     height_m: Size | None = Field(None, description="the height along z, in 3-D only [m]")
 
 
+Entry = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
 class MeshFile(Body):
-    """A triangle mesh from a file, turned about z and moved; 3-D only."""
+    """A triangle mesh from a file, turned about z and moved; in 2-D, where it meets z = 0."""
 
     kind: Literal["mesh"]
     file: str = Field(
@@ -157,6 +160,38 @@ class MeshFile(Body):
     centre_m: Position = Field(
         (0.0, 0.0, 0.0), description="the point to which the file's origin is moved [m]"
     )
+    matrix: (
+        Annotated[
+            tuple[
+                Entry, Entry, Entry, Entry, Entry, Entry, Entry, Entry, Entry, Entry, Entry, Entry
+            ],
+            Field(strict=False),
+        ]
+        | None
+    ) = Field(
+        None,
+        description="twelve numbers, row by row: the 3 x 4 matrix applied to the file's vertices "
+        "before scale, angle_deg and centre_m",
+    )
+    facets: Literal["cut", "file"] = Field(
+        "cut", description="'cut' the triangles until they are fine enough, or 'file': as they are"
+    )
+    hollow: bool = Field(
+        False,
+        description="whether a closed mesh is a shell that can be seen from within, such as a "
+        "room, and no solid",
+    )
+
+    @model_validator(mode="after")
+    def _frozen_facets_are_rough_by_themselves(self) -> "MeshFile":
+        if self.facets == "file" and self.roughness is not None and self.roughness.rms > 0:
+            raise PydanticCustomError(
+                "facets",
+                "facets = 'file' takes the surface as it is, and roughness.rms_mm = {rms} would "
+                "change it; set rms_mm = 0, or facets = 'cut'",
+                {"rms": self.roughness.rms_mm},
+            )
+        return self
 
 
 SceneObject = Annotated[Plate | Cylinder | Box | MeshFile, Field(discriminator="kind")]

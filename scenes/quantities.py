@@ -12,7 +12,8 @@ FARTHEST = 1000.0
 THINNEST = 1e-5
 """Smallest size of an object: a tenth of the wavelength at 3 THz [m]."""
 
-_FORBIDDEN = "./\\=\"'[]"
+FORBIDDEN_IN_NAMES = "./\\=\"'[]"
+"""Signs that a name must not hold: it is part of dotted keys and of file names."""
 
 
 class Checked(BaseModel):
@@ -36,13 +37,13 @@ def _three_coordinates(value: object) -> tuple[object, ...]:
 def _name(value: str) -> str:
     if not value:
         raise PydanticCustomError("name", "must not be empty; give it a name, such as 'wall'")
-    bad = [sign for sign in value if sign in _FORBIDDEN or not sign.isprintable()]
+    bad = [sign for sign in value if sign in FORBIDDEN_IN_NAMES or not sign.isprintable()]
     if bad or value != value.strip() or len(value) > 64:
         raise PydanticCustomError(
             "name",
             "must have at most 64 printable characters, none of {signs} and no space at its "
             "ends (it is part of keys and file names); rename it",
-            {"signs": " ".join(_FORBIDDEN)},
+            {"signs": " ".join(FORBIDDEN_IN_NAMES)},
         )
     return value
 

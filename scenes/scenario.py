@@ -15,8 +15,12 @@ from scenes.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotr
 from scenes.base_station import BaseStation
 from scenes.directions import unit_vector
 from scenes.facet_spacing import facet_problems, facet_spacing
-from scenes.objects import MATERIALS, Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
+from scenes.geometry import with_geometry
+from scenes.impairments import Impairments
+from scenes.materials import MATERIALS, Slab
+from scenes.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
 from scenes.placement import inconsistencies
+from scenes.point_target import PointTarget
 from scenes.quantities import Checked, Name, Position
 from scenes.radio import Radio
 from scenes.scenario_error import ScenarioError, did_you_mean, problems
@@ -31,15 +35,18 @@ __all__ = [
     "Directive",
     "GaussianBeam",
     "Horn",
+    "Impairments",
     "Isotropic",
     "MeshFile",
     "Noise",
     "Plate",
+    "PointTarget",
     "Radio",
     "Roughness",
     "Scenario",
     "ScenarioError",
     "SceneObject",
+    "Slab",
     "User",
     "parse_scenario",
 ]
@@ -92,8 +99,14 @@ class Scenario(Checked):
     radio: Radio = Field(description="the table [radio]")
     base_station: BaseStation = Field(description="the table [base_station]")
     objects: dict[Name, SceneObject] = Field(default_factory=dict, description="objects by name")
+    points: dict[Name, PointTarget] = Field(
+        default_factory=dict, description="ideal point targets by name"
+    )
     users: dict[Name, User] = Field(default_factory=dict, description="users by name")
     noise: Noise = Field(default_factory=Noise, description="the table [noise]")
+    impairments: Impairments = Field(
+        default_factory=Impairments, description="the table [impairments]"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> "Scenario":
@@ -102,7 +115,10 @@ class Scenario(Checked):
         found = found or _mesh_problems(self)
         found = found or [
             *_aim_problems(self),
-            *facet_problems(self.objects, self.radio.shortest_wavelength),
+            *_point_problems(self),
+            *facet_problems(
+                self.objects, self.radio.shortest_wavelength, flat=self.dimensions == 2
+            ),
             *inconsistencies(
                 self.objects,
                 array=self.base_station.element_positions.reshape(*self.base_station.shape, 3),
@@ -110,6 +126,15 @@ class Scenario(Checked):
                 clearance=self.radio.longest_wavelength,
             ),
         ]
+        offset = self.base_station.transmit_offset
+        if not found and offset is not None:
+            senders = self.base_station.element_positions + offset
+            found = inconsistencies(
+                self.objects,
+                array=senders.reshape(*self.base_station.shape, 3),
+                users={name: user.position for name, user in self.users.items()},
+                clearance=self.radio.longest_wavelength,
+            )
         if found:
             raise PydanticCustomError("inconsistent", "inconsistent", {"problems": found})
         return self
@@ -166,7 +191,8 @@ def parse_scenario(data: Mapping[str, object]) -> Scenario:
     Parameters
     ----------
     data
-        The tables; see :class:`Scenario`.
+        The tables; see :class:`Scenario`, and :class:`scenes.geometry.Geometry` for the
+        table ``geometry``, which brings in a foreign scene.
 
     Raises
     ------
@@ -174,7 +200,7 @@ def parse_scenario(data: Mapping[str, object]) -> Scenario:
         If something is missing, unknown or impossible: a line for each problem.
     """
     try:
-        return Scenario.model_validate(dict(data))
+        return Scenario.model_validate(with_geometry(data))
     except ValidationError as error:
         raise ScenarioError("\n".join(problems(error, Scenario))) from None
 
@@ -188,13 +214,24 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
             "set waves = 'spherical'"
         )
     points = {"base_station.position_m": scenario.base_station.position_m}
+    if scenario.base_station.transmit_offset_m is not None:
+        points["base_station.transmit_offset_m"] = scenario.base_station.transmit_offset_m
+        if flat and scenario.max_bounces > 1:
+            found.append(
+                f"base_station.transmit_offset_m = "
+                f"{list(scenario.base_station.transmit_offset_m[:2])}: with transmitter and "
+                f"receiver apart, echoes of one bounce only are known, and max_bounces = "
+                f"{scenario.max_bounces}; set max_bounces = 1, or leave transmit_offset_m out"
+            )
+    points |= {f"points.{name}.position_m": one.position_m for name, one in scenario.points.items()}
     for name, body in scenario.objects.items():
         points[f"objects.{name}.centre_m"] = body.centre_m
         if isinstance(body, MeshFile):
-            if flat:
+            if flat and body.roughness is not None and body.roughness.rms > 0:
                 found.append(
-                    f"objects.{name}.kind = 'mesh': possible in three dimensions only; "
-                    "set dimensions = 3, or use plates, cylinders and boxes"
+                    f"objects.{name}.roughness.rms_mm = {body.roughness.rms_mm}: a mesh can be "
+                    "rough in three dimensions only; set it to 0, set dimensions = 3, or use "
+                    "plates, cylinders and boxes"
                 )
         elif flat and body.height_m is not None:
             found.append(
@@ -232,6 +269,10 @@ def _mesh_problems(scenario: Scenario) -> list[str]:
 
             try:
                 placed_mesh(body)
+                if scenario.dimensions == 2:
+                    from scenes.mesh_lines import mesh_segments
+
+                    mesh_segments(body)
             except ScenarioError as error:
                 found.append(f"objects.{name}.file: {error}")
     return found
@@ -256,6 +297,28 @@ def _aim_problems(scenario: Scenario) -> list[str]:
             scenario.aim(antenna, np.array(station.position_m, dtype=np.float64))
         except ScenarioError as error:
             found.append(f"{key}.antenna: {error}")
+    return found
+
+
+def _point_problems(scenario: Scenario) -> list[str]:
+    if scenario.points and scenario.waves == "cylindrical":
+        return [
+            "waves = 'cylindrical': a point has no radar cross-section in them; set "
+            "waves = 'spherical', or remove the points"
+        ]
+    found = []
+    stations = {"the array": scenario.base_station.element_positions}
+    stations |= {f"users.{name}": user.position[None] for name, user in scenario.users.items()}
+    clearance = scenario.radio.longest_wavelength
+    for name, point in scenario.points.items():
+        for station, places in stations.items():
+            distance = float(np.linalg.norm(places - point.position, axis=-1).min())
+            if distance < clearance:
+                found.append(
+                    f"points.{name}.position_m = {list(point.position_m)}: is "
+                    f"{distance * 1e3:.3g} mm from {station}; it must keep "
+                    f"{clearance * 1e3:.3g} mm (the longest wavelength) away; move it"
+                )
     return found
 
 

@@ -73,12 +73,16 @@ def object_surface(
         raise ValueError(f"spacing = {spacing} m must be positive; give a length")
     heights = Heights(body.roughness, random_stream(seed, sample, f"roughness/{name}"))
     if isinstance(body, MeshFile):
-        from scenes.mesh_surface import (
-            mesh_is_closed,
-            mesh_surface,
-        )  # trimesh takes a second to import
+        # trimesh takes a second to import
+        if scenario.dimensions == 2:
+            from scenes.mesh_lines import lines_are_closed, mesh_lines
 
-        shape, closed = mesh_surface(body, spacing, heights), mesh_is_closed(body)
+            shape = mesh_lines(body, spacing, heights)
+            closed = not body.hollow and lines_are_closed(shape.cells)
+        else:
+            from scenes.mesh_surface import mesh_is_closed, mesh_surface
+
+            shape, closed = mesh_surface(body, spacing, heights), mesh_is_closed(body)
     else:
         _refuse_too_many(name, body, spacing)
         shape, closed = upright_shape(body, spacing, heights), not isinstance(body, Plate)

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from scenes.shapes import Surface
+from simulator.materials import Conductor, Material
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +19,8 @@ class Facets:
     sizes: Float[np.ndarray, " facets"]  # length [m] or area [m²]
     edges: Float[np.ndarray, "facets sides 3"]  # one along a line, two along a triangle [m]
     two_sided: Bool[np.ndarray, " facets"]
+    materials: tuple[Material, ...] = (Conductor(),)
+    material: Int[np.ndarray, " facets"] | None = None  # index; None: all are the first
 
     @property
     def count(self) -> int:
@@ -29,9 +32,42 @@ class Facets:
         """Longest edge. [m]."""
         return float(np.linalg.norm(self.edges, axis=-1).max(initial=0.0))
 
+    @property
+    def flat(self) -> bool:
+        """Whether these are lines of a scene that is invariant along z."""
+        return int(self.edges.shape[1]) == 1
 
-def surface_facets(surface: Surface) -> Facets:
-    """Make a facet of each cell of a surface (line cells: 2-D, triangles: 3-D)."""
+    @property
+    def by_material(self) -> tuple[tuple[Material, Bool[np.ndarray, " facets"] | None], ...]:
+        """Each material that occurs, and which facets are of it; None: all."""
+        if self.material is None:
+            return ((self.materials[0], None),)
+        kinds: list[tuple[Material, list[int]]] = []
+        for index, material in enumerate(self.materials):
+            same = [k for k in kinds if k[0] is material or _both_conduct(k[0], material)]
+            if same:
+                same[0][1].append(index)
+            else:
+                kinds.append((material, [index]))
+        if len(kinds) == 1:
+            return ((kinds[0][0], None),)
+        return tuple((material, np.isin(self.material, which)) for material, which in kinds)
+
+
+def _both_conduct(one: Material, other: Material) -> bool:
+    return isinstance(one, Conductor) and isinstance(other, Conductor)
+
+
+def surface_facets(surface: Surface, material: Material | None = None) -> Facets:
+    """Make a facet of each cell of a surface (line cells: 2-D, triangles: 3-D).
+
+    Parameters
+    ----------
+    surface
+        The surface, as it is displaced.
+    material
+        What all of it is made of; by default a conductor.
+    """
     corners = surface.vertices[surface.cells]
     edges = corners[:, 1:] - corners[:, :1]
     if surface.cells.shape[1] == 2:
@@ -49,6 +85,7 @@ def surface_facets(surface: Surface) -> Facets:
         sizes=sizes,
         edges=edges,
         two_sided=np.full(len(sizes), not surface.closed),
+        materials=(Conductor() if material is None else material,),
     )
 
 
@@ -62,11 +99,19 @@ def joined(parts: Sequence[Facets]) -> Facets:
     """
     if not parts:
         raise ValueError("no facets to join: the scene has no scattering object")
+    first = np.cumsum([0, *(len(part.materials) for part in parts)])
+    indices = [
+        start + (np.zeros(part.count, dtype=np.int64) if part.material is None else part.material)
+        for start, part in zip(first, parts, strict=False)
+    ]
     return Facets(
-        **{
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in ("centres", "normals", "sizes", "edges", "two_sided")
-        }
+        centres=np.concatenate([part.centres for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
+        sizes=np.concatenate([part.sizes for part in parts]),
+        edges=np.concatenate([part.edges for part in parts]),
+        two_sided=np.concatenate([part.two_sided for part in parts]),
+        materials=tuple(material for part in parts for material in part.materials),
+        material=np.concatenate(indices),
     )
 
 

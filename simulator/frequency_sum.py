@@ -35,7 +35,7 @@ def lagrange_basis(
     return basis
 
 
-def nodes_needed(delay_spread: float, bandwidth: float) -> int:
+def nodes_needed(delay_spread: float, bandwidth: float, *, accuracy: float = ACCURACY) -> int:
     r"""Count the nodes that interpolate :math:`\operatorname{sinc}(\pi f \Delta\tau)` over a band.
 
     The interpolation error of :math:`e^{j\delta u}`, :math:`|u| \le 1`, at M Chebyshev nodes is
@@ -47,14 +47,16 @@ def nodes_needed(delay_spread: float, bandwidth: float) -> int:
         Largest difference of delay over one contribution, :math:`\Delta\tau`. [s]
     bandwidth
         Width of the band, B. [Hz]
+    accuracy
+        Largest error. [-]
 
     Returns
     -------
-    The smallest M whose bound is below :data:`ACCURACY`.
+    The smallest M whose bound is below it.
     """
     half_phase = math.pi * delay_spread * bandwidth / 2
     count = 1
-    while 2 * (half_phase / 2) ** count / math.factorial(count) > ACCURACY:
+    while 2 * (half_phase / 2) ** count / math.factorial(count) > accuracy:
         count += 1
     return count
 
@@ -65,6 +67,7 @@ class FrequencySum:
 
     frequencies: Float[np.ndarray, " freqs"]  # uniform [Hz]
     nodes: Float[np.ndarray, " nodes"]  # where amplitudes are sampled [Hz]
+    accuracy: float = ACCURACY  # of the transform [-]
     _local: threading.local = field(default_factory=threading.local, repr=False)
 
     def __call__(
@@ -73,25 +76,52 @@ class FrequencySum:
         amplitudes: Float[np.ndarray, "nodes sources"] | Complex[np.ndarray, "nodes sources"],
     ) -> Complex[np.ndarray, " freqs"]:
         """Sum ``amplitudes`` delayed by ``delays`` [s]; error about :data:`ACCURACY`."""
-        count = self.frequencies.size
         if delays.size == 0:
-            return np.zeros(count, dtype=np.complex128)
+            return np.zeros(self.frequencies.size, dtype=np.complex128)
+        # Whole turns are taken out in float64: there are thousands of them.
+        turns = self.centre * delays
+        carrier = np.exp(-2j * np.pi * (turns - np.round(turns)))
+        steps = self.step * delays
+        return self.transform(2 * np.pi * (steps - np.round(steps)), amplitudes * carrier)
+
+    @property
+    def step(self) -> float:
+        """Step of the frequency grid. [Hz]."""
+        count = self.frequencies.size
+        return float(self.frequencies[-1] - self.frequencies[0]) / max(count - 1, 1)
+
+    @property
+    def centre(self) -> float:
+        """Frequency in the middle of the grid, on it. [Hz]."""
+        return float(self.frequencies[0]) + (self.frequencies.size // 2) * self.step
+
+    def transform(
+        self, phases: Float[np.ndarray, " sources"], terms: Complex[np.ndarray, "nodes sources"]
+    ) -> Complex[np.ndarray, " freqs"]:
+        """Sum terms that turn by a phase from one frequency to the next.
+
+        Parameters
+        ----------
+        phases
+            2π · step · delay, within ±π. [rad]
+        terms
+            Amplitudes at the nodes, delayed as at :attr:`centre`.
+        """
+        count = self.frequencies.size
         if not hasattr(self._local, "plan"):  # a plan serves one thread
             self._local.plan = finufft.Plan(
-                1, (count,), self.nodes.size, eps=ACCURACY, isign=-1, dtype="complex128", nthreads=1
+                1,
+                (count,),
+                self.nodes.size,
+                eps=self.accuracy,
+                isign=-1,
+                dtype="complex128",
+                nthreads=1,
             )
             self._local.basis = lagrange_basis(self.nodes, self.frequencies)
-        step = (self.frequencies[-1] - self.frequencies[0]) / max(count - 1, 1)
-        centre = self.frequencies[0] + (count // 2) * step
-        # Whole turns are taken out in float64: there are thousands of them.
-        turns = centre * delays
-        carrier = np.exp(-2j * np.pi * (turns - np.round(turns)))
-        steps = step * delays
-        self._local.plan.setpts(2 * np.pi * (steps - np.round(steps)))
-        terms = self._local.plan.execute(
-            np.ascontiguousarray(amplitudes * carrier, dtype=np.complex128)
-        )
+        self._local.plan.setpts(phases)
+        sums = self._local.plan.execute(np.ascontiguousarray(terms, dtype=np.complex128))
         spectrum: np.ndarray = np.einsum(
-            "mf,mf->f", self._local.basis, terms.reshape(self.nodes.size, count)
+            "mf,mf->f", self._local.basis, sums.reshape(self.nodes.size, count)
         )
         return spectrum

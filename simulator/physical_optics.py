@@ -7,7 +7,8 @@ Between two antenna ports, a facet of size :math:`\Delta A` with reflection coef
           \operatorname{sinc}(k\,(\hat u_t + \hat u_r)\cdot e / 2)
 
 with the free-space links :math:`h = g\lambda/(4\pi r)\,e^{-jkr}` of both legs, antenna
-patterns :math:`g`, and the facet's edge :math:`e`. The usual :math:`2\cos\theta_i` is not
+patterns :math:`g`, and the facet's edge :math:`e`; :math:`\Gamma` is that of
+:mod:`simulator.facet_reflection`. The usual :math:`2\cos\theta_i` is not
 reciprocal. For line facets, the integral along z is done by stationary phase, which gives
 the spherical wave of a scene that is invariant along z; the cylindrical wave is that of a
 unit line source :math:`G = -\tfrac{j}{4} H_0^{(2)}(kr)`, for comparison with
@@ -15,6 +16,7 @@ two-dimensional full-wave solvers.
 """
 
 import math
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -25,14 +27,33 @@ from scipy.constants import speed_of_light
 
 from estimator.engine import thread_count
 from estimator.measurement import Waves
+from simulator.facet_reflection import (
+    angle_class,
+    echo_coefficient,
+    facet_coefficients,
+    half_angle_cosine,
+    reflection_nodes,
+)
 from simulator.facets import Facets
 from simulator.frequency_sum import FrequencySum, chebyshev_nodes, nodes_needed
-
-CONDUCTOR = -1.0  # reflection coefficient of the electric field
+from simulator.materials import Absorber, Conductor, Material
 
 SERIES_DEGREE = 16
 """Terms of a triangle's transform: corner phases stay below π, and π¹⁷·2/19! is 5e-9."""
 
+SAMPLES_AT_ONCE = 4_000_000
+"""Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
+
+FEWEST_FOR_KERNEL = 200_000
+"""Triangles times links from which the kernel is worth compiling, a third of a second. [-]"""
+
+TRIANGLE_ACCURACY = 8e-4
+"""Error of interpolating a triangle's farthest corner over the band. The average over a
+triangle takes at most an eighth of that to second order, a fortieth to third: the moments of
+its points about the centroid. [-]"""
+
+MOST_TRIED, MARGIN = 16, 1.1
+"""Links of which the facets' slopes are looked at, and what the others may exceed them by."""
 
 Pattern = Callable[
     [Float[np.ndarray, "facets 3"], Float[np.ndarray, " facets"], Float[np.ndarray, " nodes"]],
@@ -81,17 +102,28 @@ def scattered(
     -------
     S-parameter of each link; with cylindrical waves, field per unit line source. [-]
     """
-    band = float(frequencies[-1] - frequencies[0])
-    count = nodes_needed(2 * facets.extent / speed_of_light, band)
+    monostatic = receive is transmit
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    count = nodes_needed(2 * facets.extent / speed_of_light, stop - start)
     count += transmit.nodes + receive.nodes - 2  # degrees of a product add up
-    nodes = chebyshev_nodes(float(frequencies[0]), float(frequencies[-1]), count)
-    total = FrequencySum(frequencies, nodes)
-    shared = _Leg(facets, transmit, 0, nodes) if len(transmit.positions) == 1 else None
+    parts = [
+        _Part(material, mask, count, frequencies, monostatic=monostatic)
+        for material, mask in facets.by_material
+        if not isinstance(material, Absorber)
+    ]
+    if _suits_the_kernel(facets, transmit, receive, parts):
+        return _by_kernel(facets, transmit, receive, parts, frequencies, advance)
+    shared = _Leg(facets, transmit, 0) if len(transmit.positions) == 1 else None
 
     def link(index: int) -> Complex[np.ndarray, " freqs"]:
-        inward = shared or _Leg(facets, transmit, index, nodes)
-        outward = inward if receive is transmit else _Leg(facets, receive, index, nodes)
-        spectrum = _link(facets, inward, outward, total, nodes, waves)
+        inward = shared or _Leg(facets, transmit, index)
+        outward = inward if monostatic else _Leg(facets, receive, index)
+        # Both ends must see the same side of the facet.
+        lit = inward.lit & outward.lit & (inward.cosine * outward.cosine > 0)
+        spectrum = np.zeros(frequencies.size, dtype=np.complex128)
+        for part in parts:
+            chosen = lit if part.mask is None else lit & part.mask
+            spectrum += _partial_link(facets, chosen, inward, outward, part, waves)
         advance()
         return spectrum
 
@@ -100,48 +132,188 @@ def scattered(
         return np.stack(list(pool.map(link, range(len(receive.positions)))))
 
 
-class _Leg:
-    """Distances, directions and gains from one port to all facets."""
+def _suits_the_kernel(
+    facets: Facets, transmit: Ports, receive: Ports, parts: "list[_Part]"
+) -> bool:
+    """Tell whether these are many triangles that reflect alike over the band."""
+    many = not facets.flat and facets.count * len(receive.positions) >= FEWEST_FOR_KERNEL
+    alike = all(part.monostatic or isinstance(part.material, Conductor) for part in parts)
+    return many and alike and transmit.nodes == receive.nodes == 1
+
+
+def _by_kernel(
+    facets: Facets,
+    transmit: Ports,
+    receive: Ports,
+    parts: "list[_Part]",
+    frequencies: Float[np.ndarray, " freqs"],
+    advance: Callable[[], None],
+) -> Complex[np.ndarray, "links freqs"]:
+    from simulator.facet_kernel import FacetKernel, Weights, sum_links
+
+    monostatic, count = receive is transmit, len(receive.positions)
+    senders = np.zeros(count, dtype=int) if len(transmit.positions) == 1 else np.arange(count)
+    pairs = [
+        (transmit.positions[sender], receive.positions[index])
+        for index, sender in enumerate(senders)
+    ]
+    kernel = FacetKernel(facets)
+    some = np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(int))
+    spread = MARGIN * kernel.typical_advance([pairs[index] for index in some])
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    nodes = chebyshev_nodes(
+        start, stop, nodes_needed(spread, stop - start, accuracy=TRIANGLE_ACCURACY)
+    )
+    total = FrequencySum(frequencies, nodes)
+
+    def gain(ports: Ports, index: int) -> Float[np.ndarray, " facets"] | None:
+        if ports.pattern is isotropic:
+            return None
+        return np.asarray(_Leg(facets, ports, index).gain(np.arange(facets.count), nodes)[0].real)
+
+    spectrum = np.zeros((count, frequencies.size), dtype=np.complex128)
+    for part in parts:
+
+        def weights(index: int, part: _Part = part) -> Weights:
+            sender = int(senders[index])
+            lit = transmit.visible[sender]
+            lit = lit if monostatic else lit & receive.visible[index]
+            lit = lit if part.mask is None else lit & part.mask
+            one = gain(transmit, sender)
+            other = one if monostatic else gain(receive, index)
+            both = other if one is None else one if other is None else one * other
+            return Weights(lit=lit, gain=both)
+
+        def told(part: _Part = part) -> None:
+            if part is parts[-1]:
+                advance()
+
+        sums = sum_links(kernel, pairs, weights, total, monostatic=monostatic, advance=told)
+        # The kernel turns the field round; what is common to all facets does so itself.
+        spectrum += sums if part.common is None else -part.common * sums
+    return 1j * spectrum
+
+
+def isotropic(
+    directions: Float[np.ndarray, "facets 3"],
+    distances: Float[np.ndarray, " facets"],
+    frequencies: Float[np.ndarray, " nodes"],
+) -> Float[np.ndarray, "1 facets"]:
+    """Pattern of an isotropic port."""
+    return np.ones((1, len(distances)))
+
+
+class _Part:
+    """The facets of one material: how their sum over the band is sampled."""
 
     def __init__(
-        self, facets: Facets, ports: Ports, index: int, nodes: Float[np.ndarray, " nodes"]
+        self,
+        material: Material,
+        mask: Bool[np.ndarray, " facets"] | None,
+        count: int,
+        frequencies: Float[np.ndarray, " freqs"],
+        *,
+        monostatic: bool,
     ) -> None:
+        self.material, self.mask, self.count = material, mask, count
+        self.frequencies, self.monostatic = frequencies, monostatic
+        # Towards where it came from, all facets reflect alike: the sum is multiplied once.
+        self.common: Complex[np.ndarray, " freqs"] | None = None
+        if monostatic and not isinstance(material, Conductor):
+            self.common = echo_coefficient(material, frequencies)
+        self._totals: dict[float, FrequencySum] = {}
+        self._lock = threading.Lock()
+
+    def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
+        """Return the sum that samples the band as finely as these facets' angles need it."""
+        same = self.monostatic or isinstance(self.material, Conductor)
+        legs = inward.direction[lit], outward.direction[lit]
+        lowest = 1.0 if same else angle_class(half_angle_cosine(*legs))
+        with self._lock:
+            if lowest not in self._totals:
+                start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
+                count = self.count
+                if not same:
+                    count += reflection_nodes(self.material, start, stop, lowest=lowest) - 1
+                nodes = chebyshev_nodes(start, stop, count)
+                self._totals[lowest] = FrequencySum(self.frequencies, nodes)
+            return self._totals[lowest]
+
+    def coefficients(
+        self,
+        inward: "_Leg",
+        outward: "_Leg",
+        some: np.ndarray,
+        nodes: Float[np.ndarray, " nodes"],
+        *,
+        flat: bool,
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        """Reflect at the nodes; what is common to all facets is left out."""
+        if self.monostatic:
+            return np.full((1, len(some)), -1.0 if self.common is None else 1.0)
+        legs = inward.direction[some], outward.direction[some]
+        return facet_coefficients(self.material, *legs, nodes, flat=flat)
+
+
+class _Leg:
+    """Distances and directions from one port to all facets."""
+
+    def __init__(self, facets: Facets, ports: Ports, index: int) -> None:
         towards = ports.positions[index] - facets.centres
         self.distance = np.sqrt(np.einsum("fx,fx->f", towards, towards))
         self.direction = towards / self.distance[:, None]
         self.cosine = np.einsum("fx,fx->f", self.direction, facets.normals)
-        self.gain = ports.pattern(-self.direction, self.distance, nodes)
         self.lit = ports.visible[index] & (facets.two_sided | (self.cosine > 0))
+        self.pattern = ports.pattern
+        self._gains: dict[int, np.ndarray] = {}
+
+    def gain(
+        self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        """Field pattern of the port towards some of the facets."""
+        if nodes.size not in self._gains:  # all parts' nodes span the same band
+            self._gains[nodes.size] = self.pattern(-self.direction, self.distance, nodes)
+        return self._gains[nodes.size][:, some]
 
 
-def _link(
+def _partial_link(
     facets: Facets,
+    chosen: Bool[np.ndarray, " facets"],
     inward: _Leg,
     outward: _Leg,
-    total: FrequencySum,
-    nodes: Float[np.ndarray, " nodes"],
+    part: _Part,
     waves: Waves,
 ) -> Complex[np.ndarray, " freqs"]:
-    # Both ends must see the same side of the facet.
-    lit = inward.lit & outward.lit & (inward.cosine * outward.cosine > 0)
-    lengths = inward.distance[lit] + outward.distance[lit]
-    product = inward.distance[lit] * outward.distance[lit]
-    obliquity = np.abs(inward.cosine[lit] + outward.cosine[lit])
-    amplitude = CONDUCTOR * obliquity * facets.sizes[lit] / (8 * np.pi)
-    gain = inward.gain[:, lit] * outward.gain[:, lit]
-    common = np.ones(total.frequencies.size, dtype=np.complex128)
-    if facets.edges.shape[1] == 2:  # (jk/λ)(λ/4π)² = j/(8π)
-        amplitude, common = amplitude / product, 1j * common
-    elif waves == "spherical":  # √(λ/L) e^{jπ/4} times the cylindrical wave
-        amplitude = amplitude / np.sqrt(product * lengths)
-        common = np.exp(0.25j * np.pi) * np.sqrt(speed_of_light / total.frequencies)
-    else:  # jk G² with |G|² = 1/(8πkr)
-        amplitude = amplitude / np.sqrt(product)
-    slope = (inward.direction[lit] + outward.direction[lit])[:, None, :] * facets.edges[lit]
-    advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
-    shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
-    spectrum: np.ndarray = common * total(lengths / speed_of_light, amplitude * gain * shape)
-    return spectrum
+    lit = np.flatnonzero(chosen)
+    add_up = part.total(inward, outward, lit)
+    nodes = add_up.nodes
+    total = np.zeros(part.frequencies.size, dtype=np.complex128)
+    at_once = max(1, SAMPLES_AT_ONCE // nodes.size)
+    for first in range(0, len(lit), at_once):
+        some = lit[first : first + at_once]
+        lengths = inward.distance[some] + outward.distance[some]
+        product = inward.distance[some] * outward.distance[some]
+        obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
+        amplitude = obliquity * facets.sizes[some] / (8 * np.pi)
+        if not facets.flat:  # (jk/λ)(λ/4π)² = j/(8π)
+            amplitude = amplitude / product
+        elif waves == "spherical":  # √(λ/L) e^{jπ/4} times the cylindrical wave
+            amplitude = amplitude / np.sqrt(product * lengths)
+        else:  # jk G² with |G|² = 1/(8πkr)
+            amplitude = amplitude / np.sqrt(product)
+        gain = inward.gain(some, nodes) * outward.gain(some, nodes)
+        slope = (inward.direction[some] + outward.direction[some])[:, None, :] * facets.edges[some]
+        advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
+        shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
+        shape = shape * part.coefficients(inward, outward, some, nodes, flat=facets.flat)
+        total += add_up(lengths / speed_of_light, amplitude * gain * shape)
+    if part.common is not None:
+        total *= part.common
+    if not facets.flat:
+        return 1j * total
+    if waves == "spherical":
+        total = np.exp(0.25j * np.pi) * np.sqrt(speed_of_light / part.frequencies) * total
+    return total
 
 
 def facet_transform(

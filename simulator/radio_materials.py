@@ -173,7 +173,8 @@ class _FollowingMaterial(rt.RadioMaterial):  # type: ignore[misc]
         scene: Any = self.scene
         if scene is None or self.slab is None:
             return
-        slab = self.slab(float(scene.frequency[0]))
+        # Sionna holds the frequency in single precision, 110 GHz as a little less than that.
+        slab = self.slab(float(f"{scene.frequency[0]:.6g}"))
         self.relative_permittivity = slab.relative_permittivity
         self.conductivity = slab.conductivity
         self.thickness = slab.thickness

@@ -1,21 +1,30 @@
 """A scenario made ready to be simulated: frozen facets, the scene for rays, antenna ports."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import sionna.rt as rt
 from jaxtyping import Float
 
-from scenes.antenna import Antenna
-from scenes.scenario import Scenario
+from scenes.antenna import Antenna, Isotropic
+from scenes.materials import Slab
+from scenes.random_streams import random_stream
+from scenes.scenario import Scenario, ScenarioError
 from scenes.shapes import object_surface
 from simulator.antennas import field_gain
+from simulator.facet_reflection import reflection_nodes
 from simulator.facets import Facets, joined, surface_facets
-from simulator.physical_optics import Pattern, Ports
+from simulator.impairments import position_jitter
+from simulator.materials import Absorber, Dielectric, Material, named_material
+from simulator.permittivity import (
+    ConstantPermittivity,
+    MaterialError,
+    Permittivity,
+    read_permittivity,
+)
+from simulator.physical_optics import Pattern, Ports, isotropic
 from simulator.ray_scene import build_scene, facets_visible
-
-CONDUCTOR = "metal"
-"""The material whose facets scatter; an absorber only blocks rays."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,23 +34,92 @@ class RadioScene:
     scenario: Scenario
     rays: rt.Scene
     facets: Facets | None  # None: nothing scatters
+    elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
 
 
 def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
-    """Draw the rough surfaces of a scenario and build its scene."""
+    """Draw the rough surfaces of a scenario and build its scene.
+
+    Raises
+    ------
+    ScenarioError
+        If a material is not known over the band, or its table cannot be read.
+    """
+    materials = scenario_materials(scenario)  # first: it is quick, and may fail
     surfaces = [
         object_surface(scenario, name, seed=seed, sample=sample) for name in scenario.objects
     ]
-    scattering = [surface_facets(surface) for surface in surfaces if surface.material == CONDUCTOR]
+    scattering = [
+        surface_facets(surface, material)
+        for surface in surfaces
+        # An absorber only blocks rays.
+        if not isinstance(material := materials[surface.name], Absorber)
+    ]
     return RadioScene(
         scenario=scenario,
         rays=build_scene(surfaces),
         facets=joined(scattering) if scattering else None,
+        elements=_true_elements(scenario, seed=seed, sample=sample),
     )
+
+
+def _true_elements(
+    scenario: Scenario, *, seed: int, sample: int
+) -> Float[np.ndarray, "elements 3"]:
+    nominal = scenario.base_station.element_positions
+    jitter = scenario.impairments.position_jitter
+    if jitter == 0:
+        return nominal
+    return position_jitter(
+        nominal,
+        rms=jitter,
+        dimensions=scenario.dimensions,
+        rng=random_stream(seed, sample, "position_jitter"),
+    )
+
+
+def scenario_materials(scenario: Scenario) -> dict[str, Material]:
+    """Return what each object is made of.
+
+    Raises
+    ------
+    ScenarioError
+        If a material is not known over the band, ripples too fast over it, or its table of
+        permittivity cannot be read; the message names the object's key.
+    """
+    frequencies = scenario.radio.frequencies
+    made: dict[str | Slab, Material] = {}
+    for name, body in scenario.objects.items():
+        if body.material in made:
+            continue
+        try:
+            material = _material(body.material, frequencies)
+            reflection_nodes(material, float(frequencies[0]), float(frequencies[-1]))
+        except MaterialError as error:
+            raise ScenarioError(f"objects.{name}.material: {error}") from None
+        made[body.material] = material
+    return {name: made[body.material] for name, body in scenario.objects.items()}
+
+
+def _material(material: str | Slab, frequencies: Float[np.ndarray, " freqs"]) -> Material:
+    if isinstance(material, str):
+        return named_material(material, frequencies)
+    if material.name is not None:
+        return named_material(material.name, frequencies, thickness=material.thickness)
+    permittivity: Permittivity
+    if material.permittivity is not None:
+        real, loss = material.permittivity
+        permittivity = ConstantPermittivity(value=complex(real, -loss))
+    else:
+        permittivity = read_permittivity(Path(str(material.file)))
+        permittivity(frequencies)  # refuses a band that it does not cover
+    return Dielectric(permittivity=permittivity, thickness=material.thickness)
 
 
 def antenna_pattern(antenna: Antenna, aim: Float[np.ndarray, " 3"]) -> Pattern:
     """Return an antenna's field pattern as the facets use it; it does not vary with frequency."""
+    if isinstance(antenna, Isotropic):
+        return isotropic
 
     def pattern(
         directions: Float[np.ndarray, "facets 3"],

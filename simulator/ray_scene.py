@@ -31,6 +31,7 @@ def build_scene(
     surfaces: Sequence[Surface],
     *,
     materials: Mapping[str, rt.RadioMaterial] | None = None,
+    frequency: float | None = None,
     half_height: float = HALF_HEIGHT,
 ) -> rt.Scene:
     """Build a Sionna RT scene; each surface becomes an object of its name.
@@ -42,10 +43,14 @@ def build_scene(
     materials
         Radio material of each surface, by the surface's name; without, all are conductors,
         which does for rays that only ask what they meet.
+    frequency
+        Of the scene, to which materials adapt; Sionna's own default without. [Hz]
     half_height
         Half the height of the strips. [m]
     """
     scene = rt.Scene()
+    if frequency is not None:
+        scene.frequency = frequency
     # Sionna's own 'metal' ends at 100 GHz; its constants do for a conductor at any frequency.
     # Its name is in the objects' name space, and none of theirs holds a slash.
     metal = rt.RadioMaterial("/conductor", relative_permittivity=1.0, conductivity=1e7)
@@ -90,16 +95,51 @@ def facets_visible(
 ) -> Bool[np.ndarray, "points facets"]:
     """Tell which facets each point sees, by a ray from just off the facet to the point."""
     visible = np.empty((len(points), facets.count), dtype=bool)
-    chunk = max(1, RAYS_AT_ONCE // max(facets.count, 1))
+    if not scene.objects or facets.count == 0:
+        visible[:] = True
+        return visible
+    # Far from the origin, single precision places vertices more coarsely.
+    rounding = 4 * float(np.finfo(np.float32).eps) * float(np.abs(facets.centres).max(initial=0.0))
+    clearance = max(CLEARANCE, rounding)
+    centres, normals = (_double(values) for values in (facets.centres, facets.normals))
+    chunk = max(1, RAYS_AT_ONCE // facets.count)
     for first in range(0, len(points), chunk):
-        some = points[first : first + chunk, None, :]
-        towards = some - facets.centres
-        side = np.sign(np.einsum("pfx,fx->pf", towards, facets.normals))
-        starts = facets.centres + CLEARANCE * side[..., None] * facets.normals
-        visible[first : first + chunk] = ~blocked(
-            scene, starts, np.broadcast_to(some, starts.shape)
-        )
+        some = points[first : first + chunk]
+        if len(some) == 1:  # no need to look anything up
+            centre, normal, end = centres, normals, _place(some[0])
+        else:
+            ray = dr.arange(mi.UInt32, len(some) * facets.count)
+            point = ray // facets.count
+            facet = ray - point * facets.count
+            centre, normal, end = (
+                mi.Vector3d(*(dr.gather(mi.Float64, axis, index) for axis in values))
+                for values, index in ((centres, facet), (normals, facet), (_double(some), point))
+            )
+        seen = ~_shadowed(scene, centre, normal, end, clearance)
+        visible[first : first + chunk] = np.asarray(seen.numpy()).reshape(len(some), facets.count)
     return visible
+
+
+def _shadowed(scene: rt.Scene, centre: Any, normal: Any, end: Any, clearance: float) -> Any:
+    """Trace from just off the facets; rays are made in double and traced in single precision."""
+    side = dr.select(dr.dot(end - centre, normal) > 0.0, mi.Float64(1.0), mi.Float64(-1.0))
+    start = centre + clearance * side * normal
+    along = end - start
+    length = dr.norm(along)
+    ray: Any = mi.Ray3f(mi.Point3f(start), mi.Vector3f(along / length))
+    ray.maxt = mi.Float(length - CLEARANCE)
+    hit = scene.mi_scene.ray_test(ray)
+    dr.eval(hit)  # while the scene lives: read later, the result crashes
+    return hit
+
+
+def _double(values: Float[np.ndarray, "*n 3"]) -> Any:
+    return mi.Vector3d(*(mi.Float64(np.ascontiguousarray(values[:, axis])) for axis in range(3)))
+
+
+def _place(point: Float[np.ndarray, " 3"]) -> Any:
+    # Opaque: the same kernel serves all points.
+    return mi.Vector3d(*(dr.opaque(mi.Float64, float(value)) for value in point))
 
 
 def blocked(

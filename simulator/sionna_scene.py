@@ -9,10 +9,11 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Float
 
+from scenes.materials import Slab
 from scenes.scenario import Scenario
 from scenes.shapes import Surface, object_surface
-from simulator.materials import Material, named_material
 from simulator.radio_materials import ANGLE_OF_INCIDENCE, radio_material
+from simulator.radio_scene import scenario_materials
 from simulator.ray_scene import HALF_HEIGHT, build_scene
 
 COLOURS = {
@@ -27,6 +28,9 @@ COLOURS = {
     "brick": (0.62, 0.32, 0.25),
 }
 """Red, green, blue of materials in renders, 0…1; grey for all others."""
+
+MARKER = 0.015
+"""Radius of the balls that show antennas in renders [m]."""
 
 
 def sionna_scene(
@@ -55,22 +59,28 @@ def sionna_scene(
 
     Raises
     ------
+    ScenarioError
+        If a material is not known over the scenario's band.
     MaterialError
-        If a material is not known at the frequency.
+        If it is not known at the frequency.
     """
     surfaces = mean_surfaces(scenario)
-    materials = {}
-    for surface in surfaces:
-        rough = scenario.objects[surface.name].roughness
-        materials[surface.name] = radio_material(
-            f"/{surface.name}",
-            object_material(scenario, surface.name),
-            rms_height=rough.rms if rough is not None else 0.0,
+    materials = {
+        name: radio_material(
+            f"/{name}",
+            material,
+            rms_height=rms_height(scenario, name),
             angle=angle,
-            colour=COLOURS.get(surface.material, (0.6, 0.6, 0.6)),
+            colour=material_colour(scenario.objects[name].material),
         )
-    scene = build_scene(surfaces, materials=materials, half_height=half_height)
-    scene.frequency = scenario.radio.centre_frequency if frequency is None else frequency
+        for name, material in scenario_materials(scenario).items()
+    }
+    scene = build_scene(
+        surfaces,
+        materials=materials,
+        frequency=scenario.radio.centre_frequency if frequency is None else frequency,
+        half_height=half_height,
+    )
     for name, user in scenario.users.items():
         place = user.position
         scene.add(
@@ -78,6 +88,7 @@ def sionna_scene(
                 f"/user/{name}",
                 position=place.tolist(),
                 look_at=_ahead(place, scenario.aim(user.antenna, place)),
+                display_radius=MARKER,
             )
         )
     centre = np.asarray(scenario.base_station.position_m, dtype=np.float64)
@@ -86,6 +97,7 @@ def sionna_scene(
             "/base_station",
             position=centre.tolist(),
             look_at=_ahead(centre, scenario.aim(scenario.base_station.antenna, centre)),
+            display_radius=MARKER,
         )
     )
     return scene
@@ -104,11 +116,35 @@ def mean_surfaces(scenario: Scenario) -> list[Surface]:
     return [object_surface(smooth, name, seed=0, spacing=np.inf) for name in smooth.objects]
 
 
-def object_material(scenario: Scenario, name: str) -> Material:
-    """Return what an object is made of, checked over the scenario's band."""
-    return named_material(scenario.objects[name].material, scenario.radio.frequencies)
+def rms_height(scenario: Scenario, name: str) -> float:
+    """Return the rms height of an object's surface, 0 if it is smooth [m]."""
+    rough = scenario.objects[name].roughness
+    return 0.0 if rough is None else rough.rms
+
+
+def material_colour(material: str | Slab) -> tuple[float, float, float]:
+    """Return the colour of a material in renders."""
+    name = material if isinstance(material, str) else str(material.name)
+    return COLOURS.get(name, (0.6, 0.6, 0.6))
 
 
 def _ahead(place: Float[np.ndarray, " 3"], aim: Float[np.ndarray, " 3"]) -> list[float]:
     ahead: list[float] = (place + aim).tolist()
     return ahead
+
+
+def stand_back(scenario: Scenario) -> tuple[list[float], list[float]]:
+    """Choose where a camera sees the whole scenario from: behind and above the base station.
+
+    Returns
+    -------
+    Position of the camera, and the point that it looks at. [m]
+    """
+    station = scenario.base_station
+    points = [station.element_positions, *(s.vertices for s in mean_surfaces(scenario))]
+    points += [user.position[None] for user in scenario.users.values()]
+    low, high = (bound(np.concatenate(points), axis=0) for bound in (np.min, np.max))
+    centre, size = (low + high) / 2, float(np.linalg.norm(high - low))
+    side = np.cross(station.boresight, [0.0, 0.0, 1.0])
+    eye = centre + size * (-1.0 * station.boresight - 0.4 * side + np.array([0.0, 0.0, 0.9]))
+    return eye.tolist(), centre.tolist()

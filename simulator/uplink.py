@@ -1,13 +1,16 @@
 """A user's pilot at the array: the line of sight, and what the facets scatter of it."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from jaxtyping import Complex
 
 from scenes.scenario import User
 from simulator.antennas import field_gain
+from simulator.ghost_echo import scattering_faces, uplink_over_surfaces
 from simulator.line_of_sight import direct_wave, in_line_of_sight
+from simulator.mutual_visibility import facets_see_each_other
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, facet_ports
 
@@ -15,7 +18,7 @@ from simulator.radio_scene import RadioScene, facet_ports
 def simulate_uplink(
     scene: RadioScene, user: User, array: Ports | None, *, advance: Callable[[], None]
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Simulate one user's noise-free pilot: direct, and over one bounce.
+    """Simulate one user's noise-free pilot: direct, over one bounce, in 2-D also over more.
 
     Over a single rough mirror the facets give the coherent and the diffuse part at once, so
     that no specular leg is added to them.
@@ -48,12 +51,23 @@ def simulate_uplink(
         advance=advance,
     )
     both: np.ndarray = pilot + over_walls
-    return both
+    if not scene.facets.flat:
+        return both
+    over_several: np.ndarray = uplink_over_surfaces(
+        scattering_faces(scene.facets),
+        partial(facets_see_each_other, scene.rays),
+        port,
+        array,
+        scene.scenario.radio.frequencies,
+        waves=scene.scenario.waves,
+        max_bounces=scene.scenario.max_bounces,
+    )
+    return np.asarray(both + over_several)
 
 
 def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
     scenario, station = scene.scenario, scene.scenario.base_station
-    elements = station.element_positions
+    elements = scene.elements
     towards = elements - user.position
     distances = np.linalg.norm(towards, axis=-1)
     directions = towards / distances[:, None]

@@ -1,5 +1,8 @@
 """The plan of a scenario: what is simulated, drawn before anything is computed."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
@@ -8,13 +11,19 @@ from matplotlib.patches import Circle, Polygon
 from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn
 from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.scenario import Scenario
+from simulator.scenario_paths import ScenarioPath
 from validation import figures, views
 
 MATERIAL_COLOURS = {"absorber": "#3d3d3d", "metal": figures.MIRROR}
+DIELECTRIC = "#8c6d4f"
+TARGET_PATH = "#2c7a51"
+FAINT_DB = -30.0
+"""Below this gain, relative to the antennas' peaks, a path is drawn faint: nobody hears it."""
+
 _BEAM = 0.25  # length of the wedge that shows where an antenna looks, over the view's size
 
 
-def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
+def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = ()) -> Axes:
     """Draw a scenario from above: array, objects, users and where their antennas look.
 
     Parameters
@@ -23,12 +32,15 @@ def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
         Is given equal axes in metres.
     scenario
         What is drawn, projected along z.
+    paths
+        Its specular paths, to be drawn with it.
     """
     station = scenario.base_station
     outlines = {name: outline(scenario, name) for name in scenario.objects}
     users = {name: user.position for name, user in scenario.users.items()}
     points = [station.element_positions, *outlines.values()]
     points += [place[None] for place in users.values()]
+    points += [target.position[None] for target in scenario.points.values()]
     view = views.view_around(np.concatenate(points))
     size = max(view.right - view.left, view.top - view.bottom)
     ax.grid(color="#dfe4e8", lw=0.6)
@@ -42,14 +54,39 @@ def draw_scenario(ax: Axes, scenario: Scenario) -> Axes:
     )
     for name, line in outlines.items():
         _draw_object(ax, scenario, name, line)
+    for path in paths:
+        style = path_style(path)
+        ax.plot(path.vertices[:, 0], path.vertices[:, 1], zorder=2.5, **style)
     figures.overlay_array(ax, station.element_positions)
     beams = [(np.asarray(station.position_m), station.antenna, figures.ARRAY)]
     beams += [(user.position, user.antenna, figures.USER) for user in scenario.users.values()]
     for place, antenna, colour in beams:
         _draw_beam(ax, place, scenario.aim(antenna, place), antenna, colour, _BEAM * size)
+    for name, target in scenario.points.items():
+        ax.plot(*target.position[:2], "+", color=figures.MIRROR, ms=9, mew=2, zorder=6)
+        ax.annotate(
+            name,
+            (float(target.position[0]), float(target.position[1])),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha="center",
+            color=figures.MIRROR,
+            fontsize=8,
+        )
     for name, place in users.items():
         figures.mark_user(ax, name, place)
     return figures.in_metres(ax, view)
+
+
+def path_style(path: ScenarioPath) -> dict[str, Any]:
+    """Choose how a path is drawn: by what is at its end, faint where no antenna looks."""
+    faint = path.gain_db < FAINT_DB
+    return {
+        "color": figures.PATH if path.kind == "user" else TARGET_PATH,
+        "lw": 1.0 if faint else 1.6,
+        "ls": ":" if faint else "-",
+        "alpha": 0.6 if faint else 0.95,
+    }
 
 
 def outline(scenario: Scenario, name: str) -> Float[np.ndarray, "corners 3"]:
@@ -77,7 +114,7 @@ def _draw_object(
 ) -> None:
     body = scenario.objects[name]
     material = body.material if isinstance(body.material, str) else body.material.name or "slab"
-    colour = MATERIAL_COLOURS.get(material, figures.PATH)
+    colour = MATERIAL_COLOURS.get(material, DIELECTRIC)
     if isinstance(body, Plate):
         ax.plot(line[:, 0], line[:, 1], color=colour, lw=3.5, solid_capstyle="butt", zorder=3)
     elif isinstance(body, Cylinder):

@@ -380,8 +380,17 @@ REFUSED: list[tuple[Table, str]] = [
     ),
     ({"base_station__elements": [3, 2]}, r"^base_station\.elements = \[3, 2\]: a planar array nee"),
     (
-        {"objects": {"a": {"kind": "mesh", "material": "metal", "file": "a.ply"}}},
-        r"^objects\.a\.kind = 'mesh': possible in three dimensions only; set dimensions = 3",
+        {
+            "objects": {
+                "a": {
+                    "kind": "mesh",
+                    "material": "metal",
+                    "file": "a.ply",
+                    "roughness": {"rms_mm": 0.1, "correlation_mm": 1.0},
+                }
+            }
+        },
+        r"^objects\.a\.roughness\.rms_mm = 0\.1: a mesh can be rough in three dimensions only; set",
     ),
     (
         {"radio__points": 100_000, "base_station__elements": 20_000, "objects": None},

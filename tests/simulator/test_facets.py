@@ -43,11 +43,7 @@ def test_a_triangle_is_a_facet_with_its_area_and_right_handed_normal() -> None:
 
 
 @settings(deadline=None, max_examples=30)
-@given(
-    st.lists(
-        st.tuples(st.floats(0.01, 1.0), st.floats(-0.5, 0.5)), min_size=3, max_size=12
-    )
-)
+@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-0.5, 0.5)), min_size=3, max_size=12))
 def test_the_facets_of_a_closed_contour_have_no_net_normal(
     steps: list[tuple[float, float]],
 ) -> None:

@@ -72,9 +72,7 @@ def flat_wall(length: float, *, y: float = 0.0, step: float = STEP) -> Facets:
     return surface_facets(profile_surface(profile))
 
 
-def flat_plate(
-    width: float, height: float, *, step: float, closed: bool = False
-) -> Facets:
+def flat_plate(width: float, height: float, *, step: float, closed: bool = False) -> Facets:
     """A plate of triangles at y = 0, normal to y."""
     x, z = (
         np.linspace(-side / 2, side / 2, int(np.ceil(side / step)) + 1) for side in (width, height)
@@ -97,7 +95,7 @@ def flat_plate(
 def image_source(length: float, waves: Waves) -> Complex[np.ndarray, " freqs"]:
     """What a mirror returns over a path of that length: the field of its image, turned round."""
     if waves == "cylindrical":
-        return np.asarray(-(-0.25j) * hankel2(0, WAVENUMBERS * length))
+        return np.asarray(0.25j * hankel2(0, WAVENUMBERS * length))
     return np.asarray(-np.exp(-1j * WAVENUMBERS * length) / (2 * WAVENUMBERS * length))
 
 
@@ -230,7 +228,7 @@ def beam(axis: Float[np.ndarray, " 3"]) -> Pattern:
         distances: Float[np.ndarray, " facets"],
         frequencies: Float[np.ndarray, " nodes"],
     ) -> Float[np.ndarray, "1 facets"]:
-        return np.exp(-3 * (1 - directions @ axis))[None]
+        return np.asarray(np.exp(-3 * (1 - directions @ axis))[None])
 
     return pattern
 
@@ -387,7 +385,11 @@ def test_a_pattern_that_turns_over_frequency_is_followed() -> None:
     here = np.array([[0.0, -0.3, 0.0]])
     plain = scattered(wall, ports(here, wall), ports(here, wall), BAND, waves="spherical")
     slow = scattered(
-        wall, ports(here, wall, pattern=delayed, nodes=8), ports(here, wall), BAND, waves="spherical"
+        wall,
+        ports(here, wall, pattern=delayed, nodes=8),
+        ports(here, wall),
+        BAND,
+        waves="spherical",
     )
     expected = plain * np.exp(-1j * WAVENUMBERS * 1e-3)
     assert np.linalg.norm(slow - expected) <= SUM_ERROR * np.linalg.norm(expected)
@@ -412,7 +414,7 @@ def test_one_transmitter_serves_all_receivers_and_each_link_is_told() -> None:
 
 def test_roughness_takes_the_coherent_loss_from_the_mean_field() -> None:
     # Physical optics of Gaussian heights: the mean field is that of the mean line times
-    # exp(-½k²σ²(cosθ_i + cosθ_s)²); slopes drop out, as h and h' are uncorrelated.
+    # exp(-½(k·rms·(cosθ_i + cosθ_s))²); slopes drop out, as h and h' are uncorrelated.
     rms, correlation, draws = 0.12e-3, 0.8e-3, 240
     smooth = flat_wall(0.2, step=0.2e-3)
     start, end = np.array([[-0.25, -0.25, 0.0]]), np.array([[0.25, -0.25, 0.0]])
@@ -464,9 +466,7 @@ def triangle_average(first: float, second: float) -> complex:
 
 
 @settings(deadline=None, max_examples=100)
-@given(
-    corners=st.tuples(*[st.floats(-1, 1)] * 3), largest=st.floats(0, np.pi)
-)
+@given(corners=st.tuples(*[st.floats(-1, 1)] * 3), largest=st.floats(0, np.pi))
 def test_a_triangle_averages_its_phase_as_quadrature_does(
     corners: tuple[float, float, float], largest: float
 ) -> None:

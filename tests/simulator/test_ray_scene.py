@@ -21,9 +21,7 @@ def line(
     return profile_surface(np.column_stack([flat, np.zeros(count)]), name=name)
 
 
-def rough_wall(
-    *, rms: float, correlation: float, distance: float = 0.8, seed: int = 0
-) -> Surface:
+def rough_wall(*, rms: float, correlation: float, distance: float = 0.8, seed: int = 0) -> Surface:
     """40 cm at 45°, as the thesis' wall."""
     count = int(0.4 / min(2.5e-4, correlation / 4)) + 1
     heights = rough_profile(
@@ -32,9 +30,7 @@ def rough_wall(
     )  # fmt: skip
     along, normal = np.array([1, 1, 0]) / np.sqrt(2), np.array([1, -1, 0]) / np.sqrt(2)
     places = np.linspace(-0.2, 0.2, count)[:, None]
-    return profile_surface(
-        np.array([0, distance, 0]) + places * along + heights[:, None] * normal
-    )
+    return profile_surface(np.array([0, distance, 0]) + places * along + heights[:, None] * normal)
 
 
 def double_blocked(

@@ -11,7 +11,8 @@ from estimator import engine
 from estimator.measurement import Measurement
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.radio_scene import radio_scene
-from simulator.simulation import Simulation, simulate
+from simulator.simulation import simulate
+from simulator.truth import scenario_truth
 
 WALL = {
     "kind": "plate",
@@ -167,7 +168,9 @@ def test_a_user_that_nothing_reaches_is_left_out_or_is_noise() -> None:
     ],
 )
 def test_where_nothing_is_received_there_is_no_measurement(tables: dict[str, Any]) -> None:
-    with pytest.raises(ScenarioError, match="'small'.*nothing is received; add an object or a user"):
+    with pytest.raises(
+        ScenarioError, match=r"'small'.*nothing is received; add an object or a user"
+    ):
         simulate(scenario(**tables), seed=0)
 
 
@@ -263,13 +266,11 @@ def test_the_measurement_says_how_it_was_made() -> None:
 def test_the_truth_holds_users_and_conducting_walls_by_name() -> None:
     shade = {"kind": "plate", "material": "absorber", "centre_m": [0.9, 0.1], "length_m": 0.2}
     post = {"kind": "cylinder", "material": "metal", "centre_m": [0.5, 0.8], "radius_m": 0.01}
-    made: Simulation = simulate(
+    truth = scenario_truth(
         scenario(
             objects={"wall": ROUGH, "shade": shade, "post": post}, users={"b": PLAIN, "a": HIDDEN}
-        ),
-        seed=0,
+        )
     )
-    truth = made.truth
     assert truth["user"].values.tolist() == ["b", "a"]
     assert truth["wall"].values.tolist() == ["wall"]
     np.testing.assert_allclose(truth["user_position"].values, [[0.25, 0.3, 0], [0.5, 0.4, 0]])
@@ -291,3 +292,59 @@ def test_only_metal_has_facets_and_all_surfaces_stop_rays() -> None:
     assert scene.facets is not None
     assert scene.facets.sizes.sum() == pytest.approx(0.2)
     assert radio_scene(scenario(objects={"shade": shade}), seed=0, sample=0).facets is None
+
+
+def test_a_transmitter_apart_is_told_and_its_echo_is_the_link() -> None:
+    apart = {"elements": 4, "spacing_mm": 2.0, "transmit_offset_m": [0.06, 0.01]}
+    scene = scenario(objects={"wall": ROUGH}, base_station=apart, max_bounces=1)
+    found = measured(scene).echo
+    assert found is not None
+    assert found.transmit_positions is not None
+    np.testing.assert_allclose(
+        found.transmit_positions - found.positions, [[0.06, 0.01, 0.0]] * 4, atol=1e-15
+    )
+    # Reciprocity: exchanging all transmitters and receivers changes nothing.
+    back = {**apart, "position_m": [0.06, 0.01], "transmit_offset_m": [-0.06, -0.01]}
+    other = measured(scenario(objects={"wall": ROUGH}, base_station=back, max_bounces=1)).echo
+    assert other is not None
+    error = np.linalg.norm(other.samples - found.samples) / np.linalg.norm(found.samples)
+    assert error <= 1e-6
+    together = measured(
+        scenario(objects={"wall": ROUGH}, base_station={**apart, "transmit_offset_m": None},
+                 max_bounces=1)
+    ).echo  # fmt: skip
+    assert together is not None
+    assert together.transmit_positions is None
+    assert np.linalg.norm(together.samples - found.samples) > 0.5 * np.linalg.norm(found.samples)
+
+
+@pytest.mark.parametrize(
+    ("station", "message"),
+    [
+        ({}, r"transmit_offset_m = \[0\.1, 0\.0\]: with transmitter and .* set max_bounces = 1"),
+        ({"transmit_offset_m": [0.1, 0.0, 0.1]}, r"transmit_offset_m = .*: z must be 0 in two"),
+        ({"transmit_offset_m": [0.0, 0.4]}, r"the array is .* objects\.wall"),
+    ],
+)
+def test_a_transmitter_that_cannot_stand_there_is_refused(
+    station: dict[str, Any], message: str
+) -> None:
+    base = {"elements": 4, "spacing_mm": 2.0, "transmit_offset_m": [0.1, 0.0], **station}
+    with pytest.raises(ScenarioError, match=message):
+        scenario(objects={"wall": WALL}, base_station=base, max_bounces=1 if station else 3)
+
+
+def test_a_point_is_seen_from_a_transmitter_apart_over_both_legs() -> None:
+    apart = {"elements": 4, "spacing_mm": 2.0, "transmit_offset_m": [0.06, 0.01]}
+    point = {"position_m": [0.1, 0.4], "rcs_m2": 1e-4}
+    found = measured(scenario(points={"p": point}, base_station=apart, max_bounces=1)).echo
+    assert found is not None
+    assert found.transmit_positions is not None
+    place = np.array([0.1, 0.4, 0.0])
+    there = np.linalg.norm(place - found.transmit_positions, axis=-1)[:, None]
+    back = np.linalg.norm(place - found.positions, axis=-1)[:, None]
+    wavelengths = speed_of_light / found.frequencies
+    expected = wavelengths * 1e-2 / ((4 * np.pi) ** 1.5 * there * back)
+    expected = expected * np.exp(-2j * np.pi * (there + back) / wavelengths)
+    # 1e3 turns of phase in double precision.
+    np.testing.assert_allclose(found.samples, expected, rtol=1e-11)

@@ -1,0 +1,56 @@
+"""Which facets of two faces see each other: it depends neither on antennas nor on frequency."""
+
+import numpy as np
+import sionna.rt as rt
+from jaxtyping import Bool
+
+from scenes.scenario_error import ScenarioError
+from simulator.one_way_field import Face
+from simulator.ray_scene import CLEARANCE, RAYS_AT_ONCE, blocked
+
+MOST_PAIRS = 2**30
+"""Most pairs of facets of two surfaces: 1 GiB, and some hours for the echo of 260 antennas. [-]"""
+
+
+def facets_see_each_other(scene: rt.Scene, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
+    """Trace a ray between each two facets that face each other.
+
+    Parameters
+    ----------
+    scene
+        What may stand between them, themselves included.
+    one, other
+        The two faces.
+
+    Returns
+    -------
+    Whether both normals look to the other facet, and nothing is between.
+
+    Raises
+    ------
+    ScenarioError
+        If there are too many pairs.
+    """
+    if one.count * other.count > MOST_PAIRS:
+        raise ScenarioError(
+            f"max_bounces: two surfaces of {one.count} and {other.count} facets make "
+            f"{one.count * other.count:.3g} pairs, more than {MOST_PAIRS:.3g}; make them shorter "
+            "or less finely rough (roughness.correlation_mm), lower radio.stop_ghz, or set "
+            "max_bounces = 1"
+        )
+    seen = np.zeros((one.count, other.count), dtype=bool)
+    starts, ends = (face.centres + CLEARANCE * face.normals for face in (one, other))
+    rows = max(1, RAYS_AT_ONCE // max(other.count, 1))
+    for first in range(0, one.count, rows):
+        block = slice(first, first + rows)
+        apart = other.centres - one.centres[block, None]
+        leaves = np.einsum("abx,ax->ab", apart, one.normals[block]) > 0
+        arrives = np.einsum("abx,bx->ab", apart, other.normals) < 0
+        some, others = np.nonzero(leaves & arrives)
+        hidden = blocked(scene, _in_space(starts[block][some]), _in_space(ends[others]))
+        seen[first + some, others] = ~hidden
+    return seen
+
+
+def _in_space(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([points, np.zeros((len(points), 1))], axis=-1)

@@ -1,0 +1,109 @@
+"""A scenario as Mitsuba XML and PLY files, which Sionna RT, Blender and mmslam open.
+
+Two scenes are written. ``NAME.xml`` holds the smooth mean surfaces, their roughness in the
+scattering coefficients: it is for Sionna's own solvers. ``NAME_facets.xml`` holds one frozen
+realisation, every facet as it is simulated, and no scattering coefficient: ``NAME_facets.toml``
+is the scenario of it, and simulates the same.
+"""
+
+import tomllib
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+from scenes.library import scenario_to_toml
+from scenes.ply_file import ply_bytes
+from scenes.scenario import Scenario
+from scenes.shapes import Surface, object_surface
+from scenes.surface_mesh import surface_to_mesh
+from scenes.toml_writer import toml_text
+from simulator.radio_materials import sionna_slab
+from simulator.radio_scene import scenario_materials
+from simulator.ray_scene import HALF_HEIGHT
+from simulator.sionna_scene import material_colour, mean_surfaces, rms_height
+
+
+def exported_files(
+    scenario: Scenario, *, seed: int = 0, sample: int = 0
+) -> Iterator[tuple[str, bytes]]:
+    """Write a scenario's two scenes to memory, file after file.
+
+    Parameters
+    ----------
+    scenario
+        In 2-D, its lines become upright strips across z = 0.
+    seed, sample
+        Which realisation of the roughness is frozen.
+
+    Yields
+    ------
+    Names, relative to the folder of the export, and contents. The same scenario and seed give
+    the same bytes.
+
+    Raises
+    ------
+    ScenarioError
+        If a material is not known over the band.
+    """
+    for suffix in ("", "_facets"):
+        frozen = bool(suffix)
+        name = scenario.name + suffix
+        yield f"{name}.xml", _scene_xml(scenario, f"{name}_meshes", frozen=frozen)
+        surfaces = (
+            (object_surface(scenario, body, seed=seed, sample=sample) for body in scenario.objects)
+            if frozen
+            else mean_surfaces(scenario)
+        )
+        for surface in surfaces:
+            yield f"{name}_meshes/{surface.name}.ply", _ply(surface)
+    yield f"{scenario.name}_facets.toml", _facets_toml(scenario).encode()
+
+
+def _ply(surface: Surface) -> bytes:
+    flat = surface.cells.shape[1] == 2
+    mesh = surface_to_mesh(surface, extrude=2 * HALF_HEIGHT if flat else None)
+    return ply_bytes(mesh.vertices, mesh.faces)
+
+
+def _scene_xml(scenario: Scenario, folder: str, *, frozen: bool) -> bytes:
+    root = ElementTree.Element("scene", {"version": "3.0.0"})
+    frequency = scenario.radio.centre_frequency
+    for name, material in scenario_materials(scenario).items():
+        slab = sionna_slab(
+            material, frequency, rms_height=0.0 if frozen else rms_height(scenario, name)
+        )
+        # A suffix, since Sionna takes away 'mat-', and an object has the name already.
+        bsdf = ElementTree.SubElement(
+            root, "bsdf", {"type": "radio-material", "id": f"mat-{name}-surface"}
+        )
+        for key, value in slab._asdict().items():
+            ElementTree.SubElement(bsdf, "float", {"name": key, "value": repr(float(value))})
+        colour = " ".join(str(part) for part in material_colour(scenario.objects[name].material))
+        ElementTree.SubElement(bsdf, "rgb", {"name": "color", "value": colour})
+    for name in scenario.objects:
+        shape = ElementTree.SubElement(root, "shape", {"type": "ply", "id": f"mesh-{name}"})
+        file = {"name": "filename", "value": f"{folder}/{name}.ply"}
+        ElementTree.SubElement(shape, "string", file)
+        ElementTree.SubElement(shape, "boolean", {"name": "face_normals", "value": "true"})
+        ElementTree.SubElement(shape, "ref", {"name": "bsdf", "id": f"mat-{name}-surface"})
+    ElementTree.indent(root)
+    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _facets_toml(scenario: Scenario) -> str:
+    data = tomllib.loads(scenario_to_toml(scenario))
+    bodies = data.pop("objects", {})
+    if bodies:
+        data["geometry"] = {
+            "file": f"{scenario.name}_facets.xml",
+            "facets": "file",
+            "objects": {name: {"material": body["material"]} for name, body in bodies.items()},
+        }
+    data["name"] = f"{scenario.name}_facets"
+    for station in (data["base_station"], *data.get("users", {}).values()):
+        antenna = station["antenna"]
+        if "aim" in antenna:
+            # A mesh's centre is that of its bounding box, a few micrometres off.
+            centre = scenario.object_centre(antenna.pop("aim")).tolist()
+            antenna["aim_m"] = centre[: scenario.dimensions]
+    return toml_text(data)

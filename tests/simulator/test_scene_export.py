@@ -1,0 +1,130 @@
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+import sionna.rt as rt
+
+from scenes.library import load_scenario
+from scenes.scenario import Scenario, parse_scenario
+from simulator.radio_materials import scattering_coefficient
+from simulator.radio_scene import radio_scene
+from simulator.ray_scene import facets_visible
+from simulator.scene_export import exported_files
+from simulator.simulation import simulate
+
+
+def exported(scenario: Scenario, folder: Path, *, seed: int = 0) -> None:
+    for name, content in exported_files(scenario, seed=seed):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def small_slam_2d() -> Scenario:
+    return load_scenario("slam_2d", ["radio.points=21", "base_station.elements=5"])
+
+
+def solid() -> Scenario:
+    """In 3-D, with a plate, a box and a cylinder, all rough."""
+    rough = {"rms_mm": 0.1, "correlation_mm": 2.0}
+    return parse_scenario(
+        {
+            "name": "solid", "dimensions": 3,
+            "radio": {"start_ghz": 20.0, "stop_ghz": 30.0, "points": 11},
+            "base_station": {"elements": [2, 2], "spacing_mm": 5.0},
+            "objects": {
+                "wall": {
+                    "kind": "plate", "material": "metal", "centre_m": [0.0, 0.4],
+                    "angle_deg": 30.0, "length_m": 0.04, "height_m": 0.03, "roughness": rough,
+                },
+                "box": {
+                    "kind": "box", "material": "metal", "centre_m": [0.1, 0.4],
+                    "angle_deg": 10.0, "length_m": 0.03, "depth_m": 0.02, "height_m": 0.04,
+                    "roughness": rough,
+                },
+                "post": {
+                    "kind": "cylinder", "material": "metal", "centre_m": [-0.1, 0.4],
+                    "radius_m": 0.02, "height_m": 0.03, "roughness": rough,
+                },
+            },
+            "users": {"user": {"position_m": [0.1, 0.2, 0.01]}},
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [small_slam_2d, solid], ids=["2-D", "3-D"])
+def test_an_exported_scene_has_the_same_facets_visibility_and_signals(
+    make: object, tmp_path: Path
+) -> None:
+    scenario: Scenario = make()  # type: ignore[operator]
+    exported(scenario, tmp_path, seed=3)
+    again = load_scenario(str(tmp_path / f"{scenario.name}_facets.toml"))
+    ours, theirs = (radio_scene(scene, seed=3, sample=0) for scene in (scenario, again))
+    assert ours.facets is not None
+    assert theirs.facets is not None
+    # PLY in double precision loses nothing; the mesh reader merges vertices closer than 10 nm,
+    # and there are none.
+    np.testing.assert_allclose(theirs.facets.centres, ours.facets.centres, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(theirs.facets.two_sided, ours.facets.two_sided)
+    points = scenario.base_station.element_positions
+    np.testing.assert_array_equal(
+        facets_visible(theirs.rays, theirs.facets, points),
+        facets_visible(ours.rays, ours.facets, points),
+    )
+    first, second = (simulate(scene, seed=3).measurement for scene in (scenario, again))
+    assert first.echo is not None
+    assert second.echo is not None
+    pairs = [(first.echo.samples, second.echo.samples)]
+    pairs += [
+        (one.samples, other.samples)
+        for one, other in zip(first.uplinks, second.uplinks, strict=True)
+    ]
+    for one, other in pairs:
+        # Rounding of 1e-16 m over a wavelength of 1 mm, and of the sums.
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-11 * np.abs(one).max())
+
+
+def test_sionna_opens_the_smooth_scene_with_its_radio_materials(tmp_path: Path) -> None:
+    scenario = small_slam_2d()
+    exported(scenario, tmp_path)
+    scene = rt.load_scene(str(tmp_path / "slam_2d.xml"), merge_shapes=False)
+    wall = scene.objects["wall"]
+    assert wall.mi_mesh.face_count() == 2
+    material = wall.radio_material
+    assert material.conductivity[0] == pytest.approx(1e7)
+    assert material.scattering_coefficient[0] == pytest.approx(
+        scattering_coefficient(0.05e-3, 257.5e9), rel=1e-6
+    )
+
+
+def test_mitsuba_reads_the_facets_to_single_precision(tmp_path: Path) -> None:
+    scenario = solid()
+    exported(scenario, tmp_path)
+    ours = radio_scene(scenario, seed=0, sample=0).rays.objects["post"].mi_mesh
+    scene = rt.load_scene(str(tmp_path / "solid_facets.xml"), merge_shapes=False)
+    theirs = scene.objects["post"].mi_mesh
+    np.testing.assert_array_equal(
+        mi.traverse(theirs)["vertex_positions"].numpy(),
+        mi.traverse(ours)["vertex_positions"].numpy(),
+    )
+    assert scene.objects["post"].radio_material.scattering_coefficient[0] == 0.0
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_one_another_wall() -> None:
+    files = [dict(exported_files(small_slam_2d(), seed=seed)) for seed in (0, 0, 1)]
+    assert files[0] == files[1]
+    changed = [name for name in files[0] if files[0][name] != files[2][name]]
+    assert changed == ["slam_2d_facets_meshes/wall.ply"]
+
+
+def test_a_scenario_of_an_exported_scene_is_exported_again(tmp_path: Path) -> None:
+    exported(solid(), tmp_path)
+    again = load_scenario(str(tmp_path / "solid_facets.toml"))
+    names = [name for name, _ in exported_files(again)]
+    assert "solid_facets_facets_meshes/post.ply" in names
+
+
+def test_a_scenario_without_objects_is_exported_too(tmp_path: Path) -> None:
+    empty = load_scenario("slam_2d").model_copy(update={"objects": {}, "users": {}})
+    exported(empty, tmp_path)
+    assert load_scenario(str(tmp_path / "slam_2d_facets.toml")).objects == {}
