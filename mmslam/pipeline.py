@@ -13,7 +13,7 @@ from estimator.storage import read_measurement, write_measurement
 from mmslam import output
 from mmslam.measurement_files import simulate_interruptibly
 from mmslam.result import result_document, to_json
-from scenes.scenario import Scenario
+from scenes.scenario import Scenario, ScenarioError
 from validation.truth import Truth, read_truth, truth_from_dataset
 
 
@@ -40,7 +40,13 @@ def run_scenario(
         Is replaced as a whole once all is done; refused before any work if it is foreign.
     progress
         Told each stage's steps.
+
+    Raises
+    ------
+    ScenarioError
+        If the estimator could not take the measurement; said before it is simulated.
     """
+    _refuse_what_cannot_be_located(scenario)
     with output.replacing(folder, output.refuse_foreign_results) as new:
         new.mkdir()
         started = time.perf_counter()
@@ -53,6 +59,15 @@ def run_scenario(
         estimate = locate(measurement, progress=progress)
         result = _write_results(new, measurement, estimate, truth, timings, scenario)
     return Outcome(folder=folder, result=result)
+
+
+def _refuse_what_cannot_be_located(scenario: Scenario) -> None:
+    along, up = scenario.base_station.shape
+    if along < 2 or up > 1:
+        raise ScenarioError(
+            f"base_station.elements: {along} × {up}; mirrors and users are located with a linear "
+            "array of at least 2 elements. `mmslam simulate` takes any array"
+        )
 
 
 def locate_measurement(

@@ -207,3 +207,11 @@ def test_an_import_replaces_a_measurement_and_nothing_else(away: Path) -> None:
     assert "not a measurement" in refused("import", source, "-o", "other")
     assert "no uplink 'horn'" in refused("import", source, "-o", "m.zarr", "--uplink", "horn")
     assert sorted(path.name for path in away.iterdir()) == ["full_wave.npz", "m.zarr", "other"]
+
+
+@pytest.mark.parametrize("elements", ["1", "[8, 8]"])
+def test_an_array_that_cannot_locate_is_refused_before_the_simulation(elements: str) -> None:
+    setting = [] if elements == "1" else ["--set", "dimensions=3"]
+    name = "slam_2d" if elements == "1" else "bench_3d"
+    setting += ["--set", f"base_station.elements={elements}"]
+    assert "with a linear array" in refused("run", name, *setting)
