@@ -35,6 +35,7 @@ from estimator.paths import find_paths
 from estimator.pixel_grid import PixelGrid
 from estimator.projection import Wall, crossing, mirrored
 from estimator.range_profiles import range_profiles
+from estimator.resolution import largest_spacing
 from estimator.user_decision import decide
 
 PIXELS = 2_000_000
@@ -99,6 +100,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             transmit_positions=None if apart is None else frame.to_local(apart),
         )
         looked_over = survey(local_echo)
+        notes += _aliasing_notes(local_echo)
         lines = detect_mirrors(local_echo, looked_over)
         loose = loose_peaks(local_echo, looked_over, lines)
         lines, walls, seen = _folded(lines)
@@ -148,6 +150,18 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         notes=tuple(notes),
         timings=timings,
     )
+
+
+def _aliasing_notes(echo: Echo) -> list[str]:
+    """Say where the image ends because the positions are too far apart to tell more."""
+    sine = imaged_sine(echo)
+    spacing = float(np.ptp(echo.positions[:, 0])) / (len(echo.positions) - 1)
+    if spacing <= largest_spacing(speed_of_light / float(echo.frequencies[-1])):
+        return []
+    return [
+        f"positions {1e3 * spacing:.3g} mm apart tell echoes from their grating lobes within "
+        f"{np.degrees(np.arcsin(sine)):.1f}° of broadside only; the image ends there"
+    ]
 
 
 def _close_up(uplink: Uplink, looked: AngleRangeMap, found: UserEstimate) -> AngleRangeMap:
