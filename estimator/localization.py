@@ -27,13 +27,14 @@ from estimator.mirrors import (
     detect_mirrors,
     echo_reach,
     echo_resolution,
+    hides,
     imaged_sine,
     loose_peaks,
     survey,
 )
 from estimator.paths import find_paths
 from estimator.pixel_grid import PixelGrid
-from estimator.projection import Wall, crossing, mirrored
+from estimator.projection import Wall, mirrored
 from estimator.range_profiles import range_profiles
 from estimator.resolution import largest_spacing
 from estimator.user_decision import decide
@@ -207,19 +208,13 @@ def _folded(
     A line whose midpoint is hidden behind a mirror is a wall's ghost: mirroring it about that
     mirror gives its true place.
     """
-
-    def hides(wall: FittedLine, line: FittedLine) -> bool:
-        far = float(np.linalg.norm(line.middle))
-        hit = crossing(np.zeros(3), line.middle / far, wall.start, wall.end)
-        return hit is not None and hit[0] < far
-
-    direct = [a for a in lines if not any(hides(b, a) for b in lines if b is not a)]
+    direct = [a for a in lines if not any(hides(b, a.middle) for b in lines if b is not a)]
     ordered, walls = list(direct), [_wall(line) for line in direct]
     seen: list[tuple[int, ...]] = [()] * len(direct)
     for line in lines:
         if any(line is other for other in direct):
             continue
-        through = next((i for i, wall in enumerate(direct) if hides(wall, line)), None)
+        through = next((i for i, wall in enumerate(direct) if hides(wall, line.middle)), None)
         if through is None:
             continue  # hidden by a ghost alone: over more mirrors than are folded here
         ordered.append(line)

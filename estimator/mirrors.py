@@ -163,7 +163,7 @@ def loose_peaks(
             peak
             for peak in looked.peaks
             if not any(_lies_on(peak, line, resolution, margin=4.0) for line in lines)
-            and not any(_hides(line, peak) for line in lines)
+            and not any(hides(line, peak) for line in lines)
         ]
     ).reshape(-1, 3)
 
@@ -174,7 +174,8 @@ def _coarse_resolution(echo: Echo) -> Resolution:
     return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
 
 
-def _hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
+def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
+    """Tell whether a line stands between the array and a point."""
     far = float(np.linalg.norm(point))
     hit = crossing(np.zeros(3), point / far, line.start, line.end)
     return hit is not None and hit[0] < far

@@ -17,6 +17,7 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement import Waves
 from simulator import materials
+from simulator.free_space import direct_wave
 from simulator.mirrors import Mirrors, dot
 from simulator.specular_paths import Chain
 
@@ -98,27 +99,6 @@ def roughness_loss(phase: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
     return loss
 
 
-def path_gain(
-    lengths: Float[np.ndarray, " paths"],
-    frequencies: Float[np.ndarray, " freqs"],
-    *,
-    waves: Waves = "spherical",
-) -> Complex[np.ndarray, "paths freqs"]:
-    r"""Free-space link over a length, with its delay.
-
-    Spherical: the S-parameter :math:`\lambda / (4\pi L)\, e^{-jkL}` between isotropic ports.
-    Cylindrical: the field of a unit line source, :math:`e^{-j (kL + \pi/4)} / \sqrt{8\pi kL}`,
-    the Hankel function for :math:`kL \gg 1`.
-    """
-    wavenumbers = 2.0 * np.pi * frequencies / speed_of_light
-    delay = np.exp(-1j * lengths[:, None] * wavenumbers)
-    if waves == "spherical":
-        link: np.ndarray = delay / (2.0 * lengths[:, None] * wavenumbers)
-    else:
-        link = delay * np.exp(-0.25j * np.pi) / np.sqrt(8 * np.pi * lengths[:, None] * wavenumbers)
-    return link
-
-
 def specular_response(
     mirrors: Mirrors,
     chains: Iterable[Chain],
@@ -159,7 +139,7 @@ def specular_response(
         for first in range(0, len(gains), paths_at_once):
             some = slice(first, first + paths_at_once)
             field = _field(mirrors, chain, some, frequencies, polarization)
-            field *= gains[some, None] * path_gain(chain.lengths[some], frequencies, waves=waves)
+            field *= gains[some, None] * direct_wave(chain.lengths[some], frequencies, waves=waves)
             response[source[some], receiver[some]] += field  # no link twice: one path a chain
     return response
 

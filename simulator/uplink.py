@@ -8,8 +8,9 @@ from jaxtyping import Complex
 
 from scenes.scenario import User
 from simulator.antennas import field_gain
+from simulator.free_space import direct_wave
 from simulator.ghost_echo import scattering_faces, uplink_over_surfaces
-from simulator.line_of_sight import direct_wave, in_line_of_sight
+from simulator.line_of_sight import in_line_of_sight
 from simulator.mutual_visibility import facets_see_each_other
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, facet_ports

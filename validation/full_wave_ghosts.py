@@ -20,7 +20,7 @@ from scenes.shapes import Surface
 from simulator.facets import joined, profile_surface, surface_facets
 from simulator.ghost_echo import ghost_echo, scattering_faces
 from simulator.mutual_visibility import facets_see_each_other
-from simulator.physical_optics import Ports
+from simulator.physical_optics import Ports, isotropic
 from simulator.ray_scene import build_scene, facets_visible
 from validation.full_wave_reference import read_reference
 
@@ -54,7 +54,7 @@ def cylinders_echo(
     return ghost_echo(
         scattering_faces(facets),
         partial(facets_see_each_other, scene),
-        Ports(positions=positions, pattern=_isotropic, visible=visible),
+        Ports(positions=positions, pattern=isotropic, visible=visible),
         two["frequency"],
         waves="cylindrical",
     )
@@ -125,14 +125,6 @@ def _read_cylinders(path: Path, wall: dict[str, np.ndarray]) -> dict[str, np.nda
             f"{wall['echo'].shape if 'echo' in wall else 'none'}; both are needed, alike"
         )
     return arrays
-
-
-def _isotropic(
-    directions: Float[np.ndarray, "facets 3"],
-    distances: Float[np.ndarray, " facets"],
-    frequencies: Float[np.ndarray, " nodes"],
-) -> Float[np.ndarray, "1 facets"]:
-    return np.ones((1, len(distances)))
 
 
 def main() -> int:

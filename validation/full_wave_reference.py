@@ -19,7 +19,7 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement import MeasurementError
 from simulator.facets import profile_surface, surface_facets
-from simulator.physical_optics import Pattern, Ports, scattered
+from simulator.physical_optics import Pattern, Ports, isotropic, scattered
 from simulator.ray_scene import build_scene, facets_visible
 
 BEAM_PARAMETER = 0.1
@@ -71,12 +71,12 @@ def compare_with_full_wave(path: Path) -> tuple[Agreement, ...]:
         visible = facets_visible(scene, facets, points)
         return Ports(positions=points, pattern=pattern, visible=visible, nodes=nodes)
 
-    array = ports(positions, _isotropic)
+    array = ports(positions, isotropic)
     senders = {"echo": array}
     if "user_position" in reference:
         user = reference["user_position"]
         aim = reference["wall_profile"].mean(axis=0) - user
-        senders["uplink_isotropic"] = ports(user[None], _isotropic)
+        senders["uplink_isotropic"] = ports(user[None], isotropic)
         senders["uplink_beam"] = ports(user[None], complex_source_beam(aim), BEAM_NODES)
     return tuple(
         _agreement(
@@ -149,14 +149,6 @@ def read_reference(path: Path) -> dict[str, np.ndarray]:
                 f"frequencies it must be {shape}"
             )
     return arrays
-
-
-def _isotropic(
-    directions: Float[np.ndarray, "facets 3"],
-    distances: Float[np.ndarray, " facets"],
-    frequencies: Float[np.ndarray, " nodes"],
-) -> Float[np.ndarray, "1 facets"]:
-    return np.ones((1, len(distances)))
 
 
 def _agreement(

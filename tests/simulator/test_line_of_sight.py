@@ -10,7 +10,8 @@ from scipy.special import hankel2
 from estimator import engine
 from scenes.shapes import Surface
 from simulator.facets import profile_surface
-from simulator.line_of_sight import direct_wave, in_line_of_sight
+from simulator.free_space import direct_wave
+from simulator.line_of_sight import in_line_of_sight
 from simulator.ray_scene import build_scene
 
 mi.set_variant(engine.mitsuba_variant())

@@ -7,10 +7,11 @@ from scipy.spatial.transform import Rotation
 from scipy.special import hankel2
 
 from simulator import materials, specular_field
+from simulator.free_space import direct_wave
 from simulator.materials import Absorber, Conductor, Dielectric, Material
 from simulator.mirrors import Mirrors
 from simulator.permittivity import ConstantPermittivity
-from simulator.specular_field import path_gain, reflected_field, specular_response
+from simulator.specular_field import reflected_field, specular_response
 from simulator.specular_paths import find_chains
 
 FREQUENCIES = np.linspace(220e9, 330e9, 101)
@@ -52,7 +53,7 @@ def reflected(
 
 
 def test_a_free_space_link_is_the_wavelength_over_four_pi_times_the_distance() -> None:
-    link = path_gain(np.array([1.8]), FREQUENCIES)[0]
+    link = direct_wave(np.array([1.8]), FREQUENCIES, waves="spherical")[0]
     wavelengths = speed_of_light / FREQUENCIES
     np.testing.assert_allclose(np.abs(link), wavelengths / (4 * np.pi * 1.8), rtol=1e-14)
     delays = np.angle(link * np.exp(1j * WAVENUMBERS * 1.8))
@@ -60,7 +61,7 @@ def test_a_free_space_link_is_the_wavelength_over_four_pi_times_the_distance() -
 
 
 def test_a_cylindrical_wave_is_the_far_field_of_a_line_source() -> None:
-    link = path_gain(np.array([0.7]), FREQUENCIES, waves="cylindrical")[0]
+    link = direct_wave(np.array([0.7]), FREQUENCIES, waves="cylindrical")[0]
     # The next term of the Hankel function is 1 / (8 k L).
     np.testing.assert_allclose(
         link, -0.25j * hankel2(0, 0.7 * WAVENUMBERS), rtol=1 / (8 * 0.7 * WAVENUMBERS[0]) * 1.01
