@@ -1,15 +1,15 @@
 """The echo: each position transmits, and receives what the facets return, there or beside it."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from jaxtyping import Complex
 
-from simulator.ghost_echo import ghost_echo, scattering_faces
-from simulator.mutual_visibility import facets_see_each_other
+from simulator.facets import Facets
+from simulator.ghost_echo import ghost_echo
 from simulator.physical_optics import Ports, scattered
-from simulator.radio_scene import RadioScene, facet_ports
+from simulator.radio_scene import RadioScene, antenna_pattern, facet_ports
+from simulator.ray_scene import facets_visible
 
 
 def simulate_echo(
@@ -22,7 +22,7 @@ def simulate_echo(
     scene
         The frozen scene.
     array
-        Ports of the array; ``None`` if nothing scatters.
+        Ports of the array; ``None`` if nothing scatters, or if antennas stand by themselves.
     advance
         Called for each position that is done.
 
@@ -32,6 +32,8 @@ def simulate_echo(
     """
     scenario = scene.scenario
     frequencies = scenario.radio.frequencies
+    if scene.facets is not None and scenario.base_station.multistatic:
+        return _link_by_link(scene, scene.facets, advance)
     if array is None or scene.facets is None:
         shape = (scenario.base_station.element_count, frequencies.size)
         return np.zeros(shape, dtype=np.complex128)
@@ -45,11 +47,38 @@ def simulate_echo(
     if not scene.facets.flat or senders is not array:
         return echo
     ghosts: np.ndarray = ghost_echo(
-        scattering_faces(scene.facets),
-        partial(facets_see_each_other, scene.rays),
+        scene.mutual_visibility.faces,
+        scene.mutual_visibility,
         array,
         frequencies,
         waves=scenario.waves,
         max_bounces=scenario.max_bounces,
     )
     return np.asarray(echo + ghosts)
+
+
+def _link_by_link(
+    scene: RadioScene, facets: Facets, advance: Callable[[], None]
+) -> Complex[np.ndarray, "positions freqs"]:
+    """Sum over one bounce between antennas that each look where they do."""
+    scenario, station = scene.scenario, scene.scenario.base_station
+    senders = station.transmit_positions(scene.elements)
+    senders = scene.elements if senders is None else senders
+    ends = (
+        (senders, station.transmit_antenna, scenario.transmit_aims(senders)),
+        (scene.elements, station.antenna, scenario.element_aims(scene.elements)),
+    )
+    rows = []
+    for index in range(len(senders)):
+        transmit, receive = (
+            Ports(
+                positions=places[index, None],
+                pattern=antenna_pattern(antenna, aims[index]),
+                visible=facets_visible(scene.rays, facets, places[index, None]),
+            )
+            for places, antenna, aims in ends
+        )
+        row = scattered(facets, transmit, receive, scenario.radio.frequencies, waves=scenario.waves)
+        rows.append(row[0])
+        advance()
+    return np.stack(rows)

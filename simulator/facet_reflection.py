@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Complex, Float
 
-from simulator.frequency_sum import ACCURACY, chebyshev_nodes
+from simulator.frequency_sum import ACCURACY, barycentric_basis, chebyshev_nodes
 from simulator.materials import Coefficients, Conductor, Material, reflection
 from simulator.permittivity import MaterialError
 
@@ -124,30 +124,16 @@ def _over_angles(
         between = np.linspace(low, high, 2 * count + 1)
         sampled = reflection(material, frequencies, angles)
         exact = reflection(material, frequencies, between)
-        basis = _interpolation(angles, between)
+        basis = barycentric_basis(angles, between).T
         worst = max(
             float(np.abs(basis @ part - true).max())
             for part, true in zip(sampled, exact, strict=True)
         )
         if worst <= ACCURACY:
-            basis = _interpolation(angles, cosines)
+            basis = barycentric_basis(angles, cosines).T
             # Not by matrix product: its rounding depends on the number of threads.
             return Coefficients(*(np.einsum("cq,qm->mc", basis, part) for part in sampled))
     return Coefficients(*(part.T for part in reflection(material, frequencies, cosines)))
-
-
-def _interpolation(
-    nodes: Float[np.ndarray, " nodes"], points: Float[np.ndarray, " points"]
-) -> Float[np.ndarray, "points nodes"]:
-    """Barycentric interpolation from Chebyshev nodes of the first kind to any points."""
-    weights = (-1.0) ** np.arange(nodes.size)
-    weights *= np.sin(np.pi * (2 * np.arange(nodes.size) + 1) / (2 * nodes.size))
-    apart = points[:, None] - nodes
-    meet = apart == 0.0
-    rows = weights / np.where(meet, 1.0, apart)
-    rows = np.where(meet.any(axis=1, keepdims=True), meet, rows)
-    matrix: np.ndarray = rows / rows.sum(axis=1, keepdims=True)
-    return matrix
 
 
 def echo_coefficient(
@@ -159,7 +145,12 @@ def echo_coefficient(
 
 
 def reflection_nodes(
-    material: Material, start: float, stop: float, *, lowest: float = STEEP
+    material: Material,
+    start: float,
+    stop: float,
+    *,
+    lowest: float = STEEP,
+    accuracy: float = ACCURACY,
 ) -> int:
     """Count the Chebyshev nodes over a band that interpolate a material's coefficients.
 
@@ -174,10 +165,12 @@ def reflection_nodes(
         The band. [Hz]
     lowest
         Cosine of the most grazing angle of incidence. [-]
+    accuracy
+        Largest error. [-]
 
     Returns
     -------
-    The fewest whose error is below :data:`simulator.frequency_sum.ACCURACY`; for angles more
+    The fewest whose error is below the accuracy; for angles more
     grazing than :data:`STEEP` no more than the last of :data:`NODE_COUNTS`, whatever the error.
 
     Raises
@@ -195,7 +188,7 @@ def reflection_nodes(
     for count in NODE_COUNTS:
         nodes = chebyshev_nodes(start, stop, count)
         sampled = np.concatenate(reflection(material, nodes, cosines))
-        worst = float(np.abs(sampled @ _interpolation(nodes, points).T - exact).max())
+        worst = float(np.abs(sampled @ barycentric_basis(nodes, points) - exact).max())
         if worst <= ACCURACY:
             return count
     if worst <= COARSEST or lowest < STEEP:

@@ -35,6 +35,20 @@ def lagrange_basis(
     return basis
 
 
+def barycentric_basis(
+    nodes: Float[np.ndarray, " nodes"], points: Float[np.ndarray, " points"]
+) -> Float[np.ndarray, "nodes points"]:
+    """Interpolate from Chebyshev nodes of the first kind to any points: each node's polynomial."""
+    weights = (-1.0) ** np.arange(nodes.size)
+    weights *= np.sin(np.pi * (2 * np.arange(nodes.size) + 1) / (2 * nodes.size))
+    apart = points - nodes[:, None]
+    meet = apart == 0.0
+    rows = weights[:, None] / np.where(meet, 1.0, apart)
+    rows = np.where(meet.any(axis=0), meet, rows)
+    basis: np.ndarray = rows / rows.sum(axis=0)
+    return basis
+
+
 def nodes_needed(delay_spread: float, bandwidth: float, *, accuracy: float = ACCURACY) -> int:
     r"""Count the nodes that interpolate :math:`\operatorname{sinc}(\pi f \Delta\tau)` over a band.
 

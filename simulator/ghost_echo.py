@@ -31,14 +31,12 @@ from scipy.constants import speed_of_light
 from estimator.engine import thread_count
 from estimator.measurement import Waves
 from simulator.facets import Facets
-from simulator.few_frequencies import EveryFrequency, few_frequencies
-from simulator.frequency_sum import FrequencySum
+from simulator.few_frequencies import EveryFrequency, FewFrequencies, few_frequencies
 from simulator.one_way_field import (
     Bounds,
     Face,
     Wave,
     direct,
-    face_coefficients,
     onward,
     onward_bounds,
     quadrature,
@@ -46,6 +44,7 @@ from simulator.one_way_field import (
     unit,
 )
 from simulator.physical_optics import Ports
+from simulator.reflection_table import reflection_table
 
 MOST_BOUNCES = 3
 """Longest chain of surfaces that is summed. [-]"""
@@ -314,11 +313,12 @@ def _linked(
     target: Face,
     links: Sequence[tuple[float, Wave, Wave]],
     ports: int,
-    total: FrequencySum | EveryFrequency,
+    total: FewFrequencies | EveryFrequency,
     waves: Waves,
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Link pairs of waves at a target, by reciprocity; the factors say how often each counts."""
     nodes, frequencies = total.nodes, total.frequencies
+    table = reflection_table(target.material, nodes)
 
     def of_port(port: int) -> Complex[np.ndarray, " freqs"]:
         delays, amplitudes = [], []
@@ -332,7 +332,8 @@ def _linked(
             advance = np.einsum("pfx,fx->pf", towards, face.edges) / speed_of_light
             cosines = np.minimum(np.hypot(towards[..., 0], towards[..., 1]) / 2, 1.0)
             weight = face.sizes * np.sinc(nodes[:, None, None] * advance)
-            weight = weight * (factor / (8 * np.pi)) * face_coefficients(face, cosines, nodes)
+            weight = weight * (factor / (8 * np.pi))
+            weight = weight * table.at(table.places(cosines), slice(None))
             if waves == "spherical":
                 lengths = sent.bounds.shortest + received.bounds.shortest
                 weight = weight / np.sqrt(lengths)

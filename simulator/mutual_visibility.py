@@ -1,5 +1,8 @@
 """Which facets of two faces see each other: it depends neither on antennas nor on frequency."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
 import sionna.rt as rt
 from jaxtyping import Bool
@@ -9,7 +12,36 @@ from simulator.one_way_field import Face
 from simulator.ray_scene import CLEARANCE, RAYS_AT_ONCE, blocked
 
 MOST_PAIRS = 2**30
-"""Most pairs of facets of two surfaces: 1 GiB, and some hours for the echo of 260 antennas. [-]"""
+"""Most pairs of facets of two surfaces: 1 GiB. [-]"""
+
+
+@dataclass(frozen=True)
+class MutualVisibility:
+    """Tells which facets of two faces see each other; each pair of faces is traced once."""
+
+    scene: rt.Scene
+    faces: Sequence[Face]  # whole
+    _traced: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+
+    def __call__(self, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
+        """Look up some facets of two faces; points within a facet see what its centre sees."""
+        (first, rows), (second, columns) = self._whole(one), self._whole(other)
+        if (second, first) in self._traced:
+            return np.asarray(self._traced[second, first].T[np.ix_(rows, columns)])
+        if (first, second) not in self._traced:
+            self._traced[first, second] = facets_see_each_other(
+                self.scene, self.faces[first], self.faces[second]
+            )
+        return np.asarray(self._traced[first, second][np.ix_(rows, columns)])
+
+    def _whole(self, part: Face) -> tuple[int, np.ndarray]:
+        """Which face it is a part of, and which facets of that face it has."""
+        index = next(
+            index
+            for index, face in enumerate(self.faces)
+            if (face.surface, face.side) == (part.surface, part.side)
+        )
+        return index, np.searchsorted(self.faces[index].source, part.source)
 
 
 def facets_see_each_other(scene: rt.Scene, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:

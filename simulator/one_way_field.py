@@ -12,33 +12,36 @@ each contribution arrives from its own direction, its derivative along the norma
 the contribution times the cosine of its angle of incidence: the *slope* of the wave. Both are
 what the next surface needs, so that chains of surfaces are made by repetition.
 
-The sum over wall facets is a product of matrices at each frequency. Once the delay of a path
+The sum over wall facets is a product of matrices at each frequency, of far smaller ones between
+blocks of facets that are far apart (:mod:`simulator.block_links`). Once the delay of a path
 in the middle of the contributions' is taken out, the field varies slowly with frequency.
 """
 
 import math
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Complex, Complex64, Float, Float32, Int
+from jaxtyping import Bool, Complex64, Float, Float32, Int
 from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
 from estimator.engine import thread_count
+from simulator.block_links import LinkPlan, phasor, plan_links, sum_planned
 from simulator.facets import Facets
-from simulator.materials import Conductor, Material, reflection
+from simulator.materials import Material
 from simulator.physical_optics import Ports
+from simulator.reflection_table import reflection_table
 
-FACETS_AT_ONCE = 64
-"""Wall facets in one matrix product. Two terms of the obliquity, cosine and sine make 256
-columns of it: up to there BLAS adds them up in one order, whatever its number of threads."""
+COLUMNS_AT_ONCE = 1024
+"""Facets of a target whose single links with a block of a wall are prepared together."""
 
-NODES_AT_ONCE = 4
-"""Frequencies that share the geometry of a block of facets."""
+LINKS_HELD = 2**24
+"""Single links whose geometry is held for all frequencies: 340 MB. [-]"""
 
 FACTOR_BYTES = 2**30
-"""What the left factors of the matrix products may take in all threads. [byte]"""
+"""What waves at one frequency may take in all threads. [byte]"""
 
 GROUP_WIDTH = 1e-3
 """Wall facets are taken together over this length to bound the lengths of paths. [m]"""
@@ -54,6 +57,7 @@ class Face:
     edges: Float[np.ndarray, "facets 2"]  # [m]
     source: Int[np.ndarray, " facets"]  # index of each facet in the whole set
     surface: int  # which object the face belongs to
+    side: int  # 1: outer, or first; -1: the back of an open surface
     material: Material
 
     @property
@@ -69,6 +73,7 @@ class Face:
                 for name in ("centres", "normals", "sizes", "edges", "source")
             },
             surface=self.surface,
+            side=self.side,
             material=self.material,
         )
 
@@ -133,7 +138,7 @@ def two_faces(
     facets: Facets, chosen: Int[np.ndarray, " chosen"], *, surface: int, material: Material
 ) -> tuple[Face, ...]:
     """Return the sides of a surface that scatter: the outer one, or both of an open surface."""
-    sides = (1.0, -1.0) if bool(facets.two_sided[chosen].any()) else (1.0,)
+    sides = (1, -1) if bool(facets.two_sided[chosen].any()) else (1,)
     return tuple(
         Face(
             centres=facets.centres[chosen, :2],
@@ -142,6 +147,7 @@ def two_faces(
             edges=facets.edges[chosen, 0, :2],
             source=chosen,
             surface=surface,
+            side=side,
             material=material,
         )
         for side in sides
@@ -160,6 +166,7 @@ def quadrature(face: Face, count: int) -> Face:
         edges=repeated.edges,
         source=repeated.source,
         surface=face.surface,
+        side=face.side,
         material=face.material,
     )
 
@@ -268,55 +275,103 @@ def onward(
     strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
     # The mirror that would lead from the ports to the middle of what is seen of the target.
     towards = target.centres[seen.any(axis=0)].mean(axis=0) if seen.any() else wall.centres[0]
-    incidence = half_angle_cosines(wall, wave.bounds.origins, towards)
-    blocks = [slice(at, at + FACETS_AT_ONCE) for at in range(0, wall.count, FACETS_AT_ONCE)]
+    table = reflection_table(wall.material, nodes)
+    incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
+    plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
+    single = _SingleLinks.left_by(plan, wall, target)
+    sizes, outward, inward = (
+        values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
+    )
 
-    def some_nodes(first: int) -> None:
-        frequencies = nodes[first : first + NODES_AT_ONCE]
-        here = slice(first, first + frequencies.size) if len(wave.strength) > 1 else slice(None)
-        coefficients = face_coefficients(wall, incidence, frequencies)
-        turns = wave.middle * (-frequencies[:, None, None] / speed_of_light)
-        reflected = coefficients.astype(np.complex64) * _phasor(turns)
-        left = _real_factors(reflected * wave.slope[here], reflected * wave.strength[here])
-        total = np.zeros((frequencies.size, 2 * ports, 2 * columns), np.float32)
-        for block in blocks:
-            distance, weights = _links(wall.part(block), target, seen[block])
-            right = np.empty((2, *weights.shape), np.float32)
-            for node, frequency in enumerate(frequencies):
-                angle = _angle(distance * (frequency / speed_of_light))
-                np.multiply(weights, np.cos(angle)[:, None], out=right[0])
-                np.multiply(weights, np.sin(angle)[:, None], out=right[1])
-                factors = left[node, :, :, :, block].reshape(2 * ports, -1)
-                total[node] += factors @ right.reshape(-1, 2 * columns)
-        parts = total.reshape(-1, 2, ports, 2, columns)
-        for node, frequency in enumerate(frequencies):
-            scale = math.sqrt(frequency / (4 * speed_of_light)) * np.exp(0.25j * np.pi)
-            turned = _phasor(bounds.middle * (frequency / speed_of_light)) * np.complex64(scale)
-            real, imaginary = parts[node]
-            strength[first + node] = turned * (real[:, 0] + 1j * imaginary[:, 0])
-            slope[first + node] = turned * (real[:, 1] + 1j * imaginary[:, 1])
+    def at_node(node: int) -> None:
+        frequency = float(nodes[node])
+        here = min(node, len(wave.strength) - 1)
+        reflected = table.at(incidence, node) * phasor(wave.middle * (-frequency / speed_of_light))
+        reflected = reflected * sizes
+        monopoles, dipoles = reflected * wave.slope[here], reflected * wave.strength[here]
+        sources = np.stack([monopoles, dipoles * outward[:, 0], dipoles * outward[:, 1]])
+        field, from_x, from_y = sum_planned(plan, sources, columns, frequency)
+        along_normal = inward[:, 0] * from_x + inward[:, 1] * from_y
+        for some in single:
+            received = some.received(monopoles[:, some.rows], dipoles[:, some.rows], frequency)
+            field[:, some.columns] += received[0]
+            along_normal[:, some.columns] += received[1]
+        scale = math.sqrt(frequency / (4 * speed_of_light)) * np.exp(0.25j * np.pi)
+        turned = phasor(bounds.middle * (frequency / speed_of_light)) * np.complex64(scale)
+        np.multiply(turned, field, out=strength[node])
+        np.multiply(turned, along_normal, out=slope[node])
 
-    needed = 32 * NODES_AT_ONCE * ports * wall.count
+    needed = 64 * ports * (wall.count + columns)
     workers = max(1, min(thread_count(), FACTOR_BYTES // needed))
     # BLAS threads of their own would spin against these: up to 20 times slower.
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
-        list(pool.map(some_nodes, range(0, nodes.size, NODES_AT_ONCE)))
+        list(pool.map(at_node, range(nodes.size)))
     return Wave(strength=strength, slope=slope, bounds=bounds)
 
 
-def _real_factors(
-    slope: Complex64[np.ndarray, "nodes ports wall"],
-    strength: Complex64[np.ndarray, "nodes ports wall"],
-) -> Float32[np.ndarray, "nodes rows 2 2 wall"]:
-    """Arrange what multiplies the cosines and the sines of the links' phases.
+@dataclass(frozen=True, kw_only=True)
+class _SingleLinks:
+    """Links between facets that are summed one by one."""
 
-    Rows: the real parts of all ports, then the imaginary parts. A real product of matrices
-    spares the links, which are many, from being made complex.
-    """
-    both = np.stack([slope, strength], axis=2)
-    real = np.stack([both.real, both.imag], axis=2)
-    imaginary = np.stack([both.imag, -both.real], axis=2)
-    return np.concatenate([real, imaginary], axis=1)
+    rows: Int[np.ndarray, " wall"]
+    columns: Int[np.ndarray, " target"]
+    distance: Float[np.ndarray, "wall target"]  # [m]
+    spreading: Float32[np.ndarray, "wall target"]  # 0 where hidden [m^-1/2]
+    leaves: Float32[np.ndarray, "wall target"]  # cosine to the wall's normal
+    arrives: Float32[np.ndarray, "wall target"]  # cosine to the target's
+
+    @classmethod
+    def left_by(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterable[_SingleLinks]":
+        """Prepare the links that the blocks leave, some at a time; once, unless too many."""
+        if int(plan.left.sum()) > LINKS_HELD:
+            return _Anew(lambda: cls._prepared(plan, wall, target))
+        return list(cls._prepared(plan, wall, target))
+
+    @classmethod
+    def _prepared(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterator[_SingleLinks]":
+        for sender in plan.senders:
+            left = plan.left[sender.members]
+            rows, columns = sender.members[left.any(axis=1)], np.flatnonzero(left.any(axis=0))
+            for first in range(0, columns.size, COLUMNS_AT_ONCE):
+                some = columns[first : first + COLUMNS_AT_ONCE]
+                between = target.centres[some] - wall.centres[rows, None]
+                # Facets that touch have no distance, and no far field either.
+                distance = np.maximum(np.linalg.norm(between, axis=-1), wall.sizes[rows, None] / 2)
+                direction = between / distance[..., None]
+                links = plan.left[np.ix_(rows, some)] / np.sqrt(distance)
+                leaves = np.einsum("wqx,wx->wq", direction, wall.normals[rows])
+                arrives = -np.einsum("wqx,qx->wq", direction, target.normals[some])
+                yield cls(
+                    rows=rows,
+                    columns=some,
+                    distance=distance,
+                    spreading=links.astype(np.float32),
+                    leaves=leaves.astype(np.float32),
+                    arrives=arrives.astype(np.float32),
+                )
+
+    def received(
+        self,
+        monopoles: Complex64[np.ndarray, "ports wall"],
+        dipoles: Complex64[np.ndarray, "ports wall"],
+        frequency: float,
+    ) -> tuple[Complex64[np.ndarray, "ports target"], Complex64[np.ndarray, "ports target"]]:
+        """Sum the field, and the field times the cosine at the target."""
+        links = self.spreading * phasor(self.distance * (-frequency / speed_of_light))
+        turned = links * self.leaves
+        strength = monopoles @ links + dipoles @ turned
+        slope = monopoles @ (links * self.arrives) + dipoles @ (turned * self.arrives)
+        return strength, slope
+
+
+@dataclass(frozen=True)
+class _Anew:
+    """Makes its items anew each time it is run through."""
+
+    make: "Callable[[], Iterator[_SingleLinks]]"
+
+    def __iter__(self) -> "Iterator[_SingleLinks]":
+        return self.make()
 
 
 def half_angle_cosines(
@@ -329,53 +384,10 @@ def half_angle_cosines(
     return np.asarray(np.minimum(np.hypot(both[..., 0], both[..., 1]) / 2, 1.0))
 
 
-def face_coefficients(
-    face: Face, cosines: Float[np.ndarray, "ports facets"], frequencies: Float[np.ndarray, " nodes"]
-) -> Float[np.ndarray, "1 1 1"] | Complex[np.ndarray, "nodes ports facets"]:
-    """Reflection coefficients of the field along z at some angles of incidence. [-]."""
-    if isinstance(face.material, Conductor):
-        return np.full((1, 1, 1), -1.0)
-    return np.moveaxis(reflection(face.material, frequencies, cosines).te, -1, 0)
-
-
 def unit(vectors: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
     """Return vectors of length 1 in the same directions."""
     unit: np.ndarray = vectors / np.hypot(vectors[..., :1], vectors[..., 1:])
     return unit
-
-
-def _links(
-    wall: Face, target: Face, seen: Bool[np.ndarray, "wall target"]
-) -> tuple[Float[np.ndarray, "wall target"], Float32[np.ndarray, "2 wall 2 target"]]:
-    """Distances, and weights of each pair: (1, cosine at wall), wall, (1, at target), target."""
-    x, y = (target.centres[:, axis] - wall.centres[:, None, axis] for axis in (0, 1))
-    # Facets that touch have no distance, and no far field either.
-    distance = np.maximum(np.sqrt(x * x + y * y), wall.sizes[:, None] / 2)
-    # Amplitudes do in single precision; the phase is another matter.
-    x, y, near = (values.astype(np.float32) for values in (x, y, 1 / distance))
-    sizes, out, into = (
-        values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
-    )
-    weights = np.empty((2, wall.count, 2, target.count), np.float32)
-    weights[0, :, 0] = seen * sizes[:, None] * np.sqrt(near)
-    weights[0, :, 1] = weights[0, :, 0] * near * -(x * into[:, 0] + y * into[:, 1])
-    leaves = near * (x * out[:, :1] + y * out[:, 1:])
-    np.multiply(weights[0], leaves[:, None], out=weights[1])
-    return distance, weights
-
-
-def _angle(turns: Float[np.ndarray, "*n"]) -> Float32[np.ndarray, "*n"]:
-    """Return an angle in radians; whole turns, of which there are thousands, go first."""
-    return np.asarray((turns - np.rint(turns)) * (2 * np.pi), dtype=np.float32)
-
-
-def _phasor(turns: Float[np.ndarray, "*n"]) -> Complex64[np.ndarray, "*n"]:
-    """Return exp(j2π·turns)."""
-    angle = _angle(turns)
-    phasor = np.empty(angle.shape, np.complex64)
-    np.cos(angle, out=phasor.real)
-    np.sin(angle, out=phasor.imag)
-    return phasor
 
 
 def _groups(wall: Face) -> np.ndarray:

@@ -1,6 +1,7 @@
 """A scenario made ready to be simulated: frozen facets, the scene for rays, antenna ports."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,10 @@ from scenes.shapes import object_surface
 from simulator.antennas import field_gain
 from simulator.facet_reflection import reflection_nodes
 from simulator.facets import Facets, joined, surface_facets
+from simulator.ghost_echo import scattering_faces
 from simulator.impairments import position_jitter
 from simulator.materials import Absorber, Dielectric, Material, named_material
+from simulator.mutual_visibility import MutualVisibility
 from simulator.permittivity import (
     ConstantPermittivity,
     MaterialError,
@@ -35,6 +38,12 @@ class RadioScene:
     rays: rt.Scene
     facets: Facets | None  # None: nothing scatters
     elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
+
+    @cached_property
+    def mutual_visibility(self) -> MutualVisibility:
+        """Which facets see each other: the same for all antennas, in echo and uplinks."""
+        faces = () if self.facets is None else scattering_faces(self.facets)
+        return MutualVisibility(self.rays, faces)
 
 
 def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
@@ -59,13 +68,12 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
         scenario=scenario,
         rays=build_scene(surfaces),
         facets=joined(scattering) if scattering else None,
-        elements=_true_elements(scenario, seed=seed, sample=sample),
+        elements=true_elements(scenario, seed=seed, sample=sample),
     )
 
 
-def _true_elements(
-    scenario: Scenario, *, seed: int, sample: int
-) -> Float[np.ndarray, "elements 3"]:
+def true_elements(scenario: Scenario, *, seed: int, sample: int) -> Float[np.ndarray, "elements 3"]:
+    """Return where the base station's antennas stand, jitter included [m]."""
     nominal = scenario.base_station.element_positions
     jitter = scenario.impairments.position_jitter
     if jitter == 0:

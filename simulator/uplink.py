@@ -1,7 +1,6 @@
 """A user's pilot at the array: the line of sight, and what the facets scatter of it."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from jaxtyping import Complex
@@ -9,9 +8,8 @@ from jaxtyping import Complex
 from scenes.scenario import User
 from simulator.antennas import field_gain
 from simulator.free_space import direct_wave
-from simulator.ghost_echo import scattering_faces, uplink_over_surfaces
+from simulator.ghost_echo import uplink_over_surfaces
 from simulator.line_of_sight import in_line_of_sight
-from simulator.mutual_visibility import facets_see_each_other
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, facet_ports
 
@@ -55,8 +53,8 @@ def simulate_uplink(
     if not scene.facets.flat:
         return both
     over_several: np.ndarray = uplink_over_surfaces(
-        scattering_faces(scene.facets),
-        partial(facets_see_each_other, scene.rays),
+        scene.mutual_visibility.faces,
+        scene.mutual_visibility,
         port,
         array,
         scene.scenario.radio.frequencies,
