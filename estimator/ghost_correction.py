@@ -1,56 +1,56 @@
-"""Ghost correction: what the image shows behind a mirror is folded back to its true place."""
+"""Ghost correction: what the image shows behind mirrors is folded back to its true place."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Complex, Float, Int
 
+from estimator.mirror_chains import Chain, image_over, possible_chains, seen_over
 from estimator.mirror_fit import Focus
-from estimator.projection import Wall, mirrored
+from estimator.projection import Wall
+
+
+@dataclass(frozen=True, kw_only=True)
+class Folded:
+    """Complex amplitudes at true places, and over which mirrors each was seen."""
+
+    values: Complex[np.ndarray, "*grid"]
+    chains: tuple[Chain, ...]
+    chain: Int[np.ndarray, "*grid"]  # index into chains; -1 where nothing is seen
 
 
 def corrected_image(
     focus: Focus, points: Float[np.ndarray, "*grid 3"], walls: Sequence[Wall]
-) -> Complex[np.ndarray, "*grid"]:
+) -> Folded:
     """Focus the echo on points where things really are.
 
-    A point that the array (at the origin) sees directly keeps its value; hidden ones have
-    none. To either comes what the raw image shows at its image in each mirror, if the ray
-    there passes through the mirror's extent. Values are focused there, not interpolated, so
-    they stay complex and exact.
+    The raw image shows a point at its image over each chain of mirrors over which the array (at
+    the origin) sees it. The brightest of these is kept, as the raw image has it: values are
+    focused there, neither interpolated nor added up.
 
     Parameters
     ----------
     focus
-        Focuses the echo; it is given only points within its reach.
+        Focuses the echo; it is given only points that are seen.
     points
         Points in the array's frame. [m]
     walls
-        Mirrors that are seen directly.
-
-    Returns
-    -------
-    Complex amplitudes. [-]
+        All mirrors, at their true place.
     """
     flat = points.reshape(-1, 3)
     values = np.zeros(len(flat), dtype=np.complex128)
-    direct = ~np.any([_hidden(flat, wall) for wall in walls] or [np.zeros(len(flat), bool)], axis=0)
-    values[direct] = focus(flat[direct])
-    for wall in walls:
-        ghosts = mirrored(flat, wall.start, wall.end)
-        through = _hidden(ghosts, wall)
-        values[through] += focus(ghosts[through])
-    return values.reshape(points.shape[:-1])
-
-
-def _hidden(points: Float[np.ndarray, "n 3"], wall: Wall) -> Bool[np.ndarray, " n"]:
-    """Tell which points the array sees through a wall: the line of sight crosses it."""
-    along = wall.end - wall.start
-    normal = np.array([along[1], -along[0]])
-    towards = points[:, :2] @ normal
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (wall.start[:2] @ normal) / towards  # of the way to the point
-        meets = share[:, None] * points[:, :2] - wall.start[:2]
-        place = meets @ along[:2] / (along @ along)
-    crossed: np.ndarray = (share > 0) & (share < 1) & (place >= 0) & (place <= 1)
-    return crossed
+    source = np.full(len(flat), -1, dtype=np.int64)
+    chains: list[Chain] = []
+    for chain in possible_chains(walls):
+        images = image_over(flat, walls, chain)
+        seen = np.flatnonzero(seen_over(images, walls, chain))
+        if not seen.size:
+            continue
+        shown = focus(images[seen])
+        brighter = (source[seen] < 0) | (np.abs(shown) > np.abs(values[seen]))
+        values[seen[brighter]] = shown[brighter]
+        source[seen[brighter]] = len(chains)
+        chains.append(chain)
+    grid = points.shape[:-1]
+    return Folded(values=values.reshape(grid), chains=tuple(chains), chain=source.reshape(grid))

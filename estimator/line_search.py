@@ -20,7 +20,7 @@ DYNAMIC_RANGE = 3e-5
 MOST_PEAKS = 400
 """Strongest peaks searched: the search is over all their pairs."""
 
-FEWEST_INLIERS = 8
+FEWEST_INLIERS = 5
 """Peaks that make a line. Of n ≤ 400 peaks thrown at random over an area of hundreds of cells
 across, some line through two of them meets 6 more with a probability below 1e-3."""
 
@@ -83,7 +83,7 @@ def significant_peaks(
 
 
 def find_lines(
-    peaks: Float[np.ndarray, "peaks 3"], resolution: Resolution
+    peaks: Float[np.ndarray, "peaks 3"], resolution: Resolution, *, most: int = MOST_PEAKS
 ) -> tuple[LineCandidate, ...]:
     """Find segments by consensus over all pairs of peaks; the one with most peaks first.
 
@@ -93,14 +93,16 @@ def find_lines(
         Points at z = 0, in the frame of an array at the origin. [m]
     resolution
         Of the image that the peaks come from.
+    most
+        Where to stop.
 
     Returns
     -------
     Segments, each with at least :data:`FEWEST_INLIERS` peaks; none uses another's peaks.
     """
-    found = []
+    found: list[LineCandidate] = []
     left = peaks
-    while len(left) >= FEWEST_INLIERS:
+    while len(left) >= FEWEST_INLIERS and len(found) < most:
         candidate, members = _best_line(left, resolution)
         if candidate is None:
             break

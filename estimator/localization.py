@@ -1,52 +1,29 @@
 """The estimator, whole: image, mirrors, angle/range map, paths, position."""
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.angle_range_map import angle_range_map, default_angles, default_path_lengths
 from estimator.array_frame import ArrayFrame, array_frame
-from estimator.backprojection import focus, prepare
-from estimator.estimate import (
-    AngleRangeMap,
-    Estimate,
-    Image,
-    Mirror,
-    Progress,
-    UserEstimate,
-)
-from estimator.ghost_correction import corrected_image
+from estimator.diffuse_location import with_diffuse_search
+from estimator.estimate import AngleRangeMap, Estimate, Progress, UserEstimate
+from estimator.localization_3d import locate_in_space
 from estimator.measurement import Echo, Measurement, Uplink, frequency_step
-from estimator.mirror_fit import FittedLine
-from estimator.mirrors import (
-    Survey,
-    detect_mirrors,
-    echo_reach,
-    echo_resolution,
-    hides,
-    imaged_sine,
-    loose_peaks,
-    survey,
-)
+from estimator.mirrors import echo_resolution, imaged_sine
 from estimator.paths import find_paths
-from estimator.pixel_grid import PixelGrid
-from estimator.projection import Wall, mirrored
-from estimator.range_profiles import range_profiles
+from estimator.planar_array import spans_a_plane
 from estimator.resolution import largest_spacing
+from estimator.room_images import room_images
+from estimator.room_map import build_room_map, mirrors_in_world, targets_in_world
 from estimator.user_decision import decide
 
-PIXELS = 2_000_000
-"""Most pixels of an image that is shown; its spacing grows beyond."""
 CLOSE_UP = 80
 """Samples of the close-up to either side."""
 CLOSE_UP_SAMPLES = 8
 """Samples of the close-up for each resolution cell λ/D or c/B."""
-MARGIN = 0.05
-"""What an image shows around the outermost things in it. [m]."""
 
 MAP_SAMPLES = 1.5
 """Samples of the angle/range map for each -3 dB width: a peak between them loses 1.3 dB at
@@ -59,7 +36,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     Parameters
     ----------
     measurement
-        Echo and uplinks of a linear array; either may be missing.
+        Echo and uplinks of a linear or a planar array; either may be missing.
     progress
         Told each stage.
 
@@ -70,13 +47,14 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     Raises
     ------
     MeasurementError
-        If the array is not linear or the frequency grid not uniform.
+        If the array is neither linear nor planar, or the frequency grid not uniform.
     """
+    if spans_a_plane((measurement.echo or measurement.uplinks[0]).positions):
+        return locate_in_space(measurement, progress=progress)
     tell = progress or (lambda stage, done, total: None)
     timings: dict[str, float] = {}
     notes = []
-    if measurement.clock_offset is None:
-        notes.append("the clock offset of the user is unknown and was taken to be 0")
+    clock_known = measurement.clock_offset is not None
     echo, uplinks = measurement.echo, _on_our_clock(measurement)
     frequency_step((echo or uplinks[0]).frequencies)  # refused before any work
     positions = (echo or uplinks[0]).positions
@@ -84,12 +62,9 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
     steps = 2 + len(uplinks)
 
     tell("estimate", 0, steps)
-    lines: tuple[FittedLine, ...] = ()
     raw = corrected = None
-    walls: tuple[Wall, ...] = ()
-    seen: tuple[tuple[int, ...], ...] = ()
-    local_echo = looked_over = None
-    loose = np.zeros((0, 3))
+    local_echo = None
+    room = None
     if echo is None:
         notes.append("no echo was measured, so nothing is known of mirrors")
     else:
@@ -100,11 +75,8 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             positions=frame.to_local(echo.positions),
             transmit_positions=None if apart is None else frame.to_local(apart),
         )
-        looked_over = survey(local_echo)
         notes += _aliasing_notes(local_echo)
-        lines = detect_mirrors(local_echo, looked_over)
-        loose = loose_peaks(local_echo, looked_over, lines)
-        lines, walls, seen = _folded(lines)
+        room = build_room_map(local_echo)
         timings["mirrors"] = time.perf_counter() - started
     tell("estimate", 1, steps)
 
@@ -121,29 +93,32 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         maps.append(looked)
         found = decide(
             uplink.user,
-            find_paths(local, looked),
-            walls,
+            find_paths(local, looked, clock_known=clock_known),
+            room.walls if room else (),
             cell=echo_resolution(local_echo).across_ray if local_echo else 0.0,
             imaged=local_echo is not None,
-            loose=loose,
+            loose=room.loose if room else np.zeros((0, 3)),
+            wall_covariance=room.joint_covariance if room else None,
+            clock_known=clock_known,
         )
+        if room and clock_known:
+            found = with_diffuse_search(found, local, room.lines, room.walls, room.seen_through)
+        notes += _clock_note(found)
         users.append(_in_world(found, frame))
         close_ups.append(_close_up(local, looked, found))
         timings[f"user {uplink.user}"] = time.perf_counter() - started
         tell("estimate", 2 + index, steps)
 
-    if local_echo is not None and looked_over is not None:
+    if local_echo is not None and room is not None:
         started = time.perf_counter()
         ends = [frame.to_local(user.path) for user in users if user.path is not None]
-        raw, corrected = _images(local_echo, looked_over, frame, walls, seen, ends)
+        raw, corrected = room_images(local_echo, room, frame, ends)
         timings["images"] = time.perf_counter() - started
     tell("estimate", steps, steps)
     return Estimate(
         users=tuple(users),
-        mirrors=tuple(
-            _mirror(frame, line, wall, through)
-            for line, wall, through in zip(lines, walls, seen, strict=True)
-        ),
+        mirrors=mirrors_in_world(room, frame) if room else (),
+        targets=targets_in_world(room, frame) if room else (),
         raw_image=raw,
         corrected_image=corrected,
         maps=tuple(maps),
@@ -151,6 +126,17 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         notes=tuple(notes),
         timings=timings,
     )
+
+
+def _clock_note(found: UserEstimate) -> list[str]:
+    """Say what a user's unknown clock was found to be off by."""
+    if found.clock_offset is None or found.clock_deviation is None or found.status != "found":
+        return []
+    paths = sum(path.used for path in found.paths)
+    return [
+        f"the clock offset of {found.name!r} is unknown; its {paths} paths give "
+        f"{1e9 * found.clock_offset:.4f} ± {1e9 * found.clock_deviation:.4f} ns"
+    ]
 
 
 def _aliasing_notes(echo: Echo) -> list[str]:
@@ -200,52 +186,6 @@ def _on_our_clock(measurement: Measurement) -> tuple[Uplink, ...]:
     )
 
 
-def _folded(
-    lines: Sequence[FittedLine],
-) -> tuple[tuple[FittedLine, ...], tuple[Wall, ...], tuple[tuple[int, ...], ...]]:
-    """Fold lines that are seen through others; those seen directly come first.
-
-    A line whose midpoint is hidden behind a mirror is a wall's ghost: mirroring it about that
-    mirror gives its true place.
-    """
-    direct = [a for a in lines if not any(hides(b, a.middle) for b in lines if b is not a)]
-    ordered, walls = list(direct), [_wall(line) for line in direct]
-    seen: list[tuple[int, ...]] = [()] * len(direct)
-    for line in lines:
-        if any(line is other for other in direct):
-            continue
-        through = next((i for i, wall in enumerate(direct) if hides(wall, line.middle)), None)
-        if through is None:
-            continue  # hidden by a ghost alone: over more mirrors than are folded here
-        ordered.append(line)
-        first = walls[through]
-        ends = mirrored(np.stack([line.start, line.end]), first.start, first.end)
-        walls.append(Wall(start=ends[0], end=ends[1], covariance=line.covariance))
-        seen.append((through,))
-    return tuple(ordered), tuple(walls), tuple(seen)
-
-
-def _wall(line: FittedLine) -> Wall:
-    return Wall(start=line.start, end=line.end, covariance=line.covariance)
-
-
-def _mirror(frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]) -> Mirror:
-    along = wall.end - wall.start
-    normal = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
-    middle = 0.5 * (wall.start + wall.end)
-    if normal @ middle > 0:  # towards the array
-        normal = -normal
-    return Mirror(
-        start=frame.to_world(wall.start),
-        end=frame.to_world(wall.end),
-        normal=frame.turned_to_world(normal),
-        covariance=wall.covariance,
-        confidence=line.confidence,
-        level_db=float(10 * np.log10(line.level / line.background)),
-        seen_through=through,
-    )
-
-
 def _in_world(user: UserEstimate, frame: ArrayFrame) -> UserEstimate:
     if user.position is None or user.covariance is None or user.path is None:
         return user
@@ -255,48 +195,4 @@ def _in_world(user: UserEstimate, frame: ArrayFrame) -> UserEstimate:
         covariance=frame.axes.T @ user.covariance @ frame.axes,
         path=frame.to_world(user.path),
         alternatives=tuple(_in_world(other, frame) for other in user.alternatives),
-    )
-
-
-def _images(
-    echo: Echo,
-    looked_over: Survey,
-    frame: ArrayFrame,
-    walls: Sequence[Wall],
-    seen: Sequence[tuple[int, ...]],
-    paths: Sequence[Float[np.ndarray, "_ 3"]],
-) -> tuple[Image, Image]:
-    """Form the raw and the corrected image on one grid, around what was found."""
-    focuser = prepare(range_profiles(echo))
-    nearest, farthest = echo_reach(echo)
-    sine = imaged_sine(echo)
-
-    def focus_in_reach(points: Float[np.ndarray, "*grid 3"]) -> np.ndarray:
-        """Focus where range and angle are unambiguous; elsewhere there is no image: 0."""
-        distance = np.linalg.norm(points, axis=-1)
-        inside = (distance > nearest) & (distance < farthest)
-        inside &= (points[..., 1] > 0) & (np.abs(points[..., 0]) < sine * distance)
-        values = np.zeros(points.shape[:-1], dtype=np.complex128)
-        values[inside] = focus(focuser, points[inside])
-        return values
-
-    shown = [np.zeros((1, 3)), echo.positions, looked_over.peaks, *paths]
-    shown += [np.stack([wall.start, wall.end]) for wall in walls]
-    grid = _grid(frame.to_world(np.concatenate(shown)), echo_resolution(echo).along_ray)
-    points = frame.to_local(grid.points)
-    direct = [wall for wall, through in zip(walls, seen, strict=True) if not through]
-    raw = focus_in_reach(points)
-    corrected = corrected_image(focus_in_reach, points, direct)
-    return Image(values=raw, grid=grid), Image(values=corrected, grid=grid)
-
-
-def _grid(shown: Float[np.ndarray, "points 3"], cell: float) -> PixelGrid:
-    """Cover all points that are to be seen, with two pixels a range cell if affordable."""
-    low, high = shown.min(axis=0) - MARGIN, shown.max(axis=0) + MARGIN
-    spacing = max(0.5 * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
-    return PixelGrid.spanning(
-        x=(float(low[0]), float(high[0])),
-        y=(float(low[1]), float(high[1])),
-        z=float(shown[:, 2].mean()),
-        spacing=spacing,
     )

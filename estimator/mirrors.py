@@ -4,21 +4,43 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import Focuser, backproject, focus, prepare
-from estimator.line_search import Resolution, find_lines, significant_peaks
+from estimator.line_search import LineCandidate, Resolution, find_lines, significant_peaks
 from estimator.measurement import Echo, MeasurementError, frequency_step
 from estimator.mirror_fit import FittedLine, Focus, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 from estimator.resolution import HALF_POWER, unaliased_sine
+from estimator.wavefront_bend import bent_intensities, coherence
 from estimator.windows import Window, aperture_taper, frequency_taper
 
 TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
 """The survey's; its sidelobes are below :data:`estimator.line_search.DYNAMIC_RANGE`."""
 
+REFLECTED = 0.5
+"""Coherence, as that of a mirror facing the array, of what does reflect it. [-]"""
+FACE = 1e-2
+"""Intensity of a facing surface's peaks over that of its reflection. [-]"""
+MOST_GAIN = 1.2
+"""Intensity that a bend of the wavefront may add to a peak; on full-wave data with two ghosts
+and their clouds it adds less than 1 % to each of the wall's peaks, less than 5 % to the ghosts,
+and more than 12 % to three quarters of the clouds', 60 % in the median. [-]"""
+LEAST_COHERENCE = 0.02
+"""Coherence of a peak that is one wave at all: sidelobes and the remains of what is nearer than
+the array is long have 1/M of M channels, speckle in a cell with twenty more has 0.05. [-]"""
+MOST_BENT = 0.6
+"""Share of bent peaks on a ghost's line: of a wall that faces the array, where many facets share a
+range, half are; of the lines that a cloud feigns, three quarters. [-]"""
+MOST_CANDIDATES = 8
+"""Lines sought among all peaks, bent ones included."""
+MOST_UNCERTAIN = 0.5
+"""Deviation of a wall's ends and of its offset: what is known no better than this is no line but
+scattered peaks. [cells]"""
+LEAST_CONTRAST = 10.0
+"""Level of a wall over its surroundings: speckle in a cloud has some lines 5 dB above it. [-]"""
 LEAST_CONFIDENCE = 0.999
 LEAST_CELLS = 8.0
 """Shortest mirror; shorter ones have no angle to speak of. [cells]"""
@@ -31,6 +53,9 @@ class Survey:
     values: Complex[np.ndarray, "ranges sines"]
     points: Float[np.ndarray, "ranges sines 3"]  # in the array's frame [m]
     peaks: Float[np.ndarray, "peaks 3"]  # that stand out of the background, strongest first [m]
+    bent: Bool[np.ndarray, " peaks"]  # whether they were scattered twice: seen nowhere
+    as_point: Float[np.ndarray, " peaks"]  # coherence over the aperture, as that of a point [-]
+    as_mirror: Float[np.ndarray, " peaks"]  # the same as that of a mirror facing the array [-]
 
 
 def echo_resolution(echo: Echo) -> Resolution:
@@ -88,7 +113,43 @@ def survey(echo: Echo) -> Survey:
     points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
     values = backproject(echo, points, weights=_taper_weights(echo))
     peaks = significant_peaks(np.abs(values) ** 2, points)
-    return Survey(values=values, points=points, peaks=peaks)
+    tried = bent_intensities(range_profiles(echo), peaks, resolution)
+    taper = _taper_weights(echo)
+    # What the noise in the image is before the sum over the positions.
+    noise = float(np.median(np.abs(values) ** 2)) / np.log(2) * taper.sum() ** 2 / (taper**2).sum()
+    across = frequency_taper(echo.frequencies, TAPER)
+    profiles = range_profiles(echo, weights=across[None, :])
+    by_shape = [
+        coherence(profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum()))
+        for flat in (False, True)
+    ]
+    return Survey(
+        values=values,
+        points=points,
+        peaks=peaks,
+        bent=(tried.max(axis=1) > MOST_GAIN * tried[:, 0])
+        & ~_faces(peaks, tried[:, 0], by_shape[1], resolution),
+        as_point=by_shape[0],
+        as_mirror=by_shape[1],
+    )
+
+
+def _faces(
+    peaks: Float[np.ndarray, "peaks 3"],
+    intensity: Float[np.ndarray, " peaks"],
+    as_mirror: Float[np.ndarray, " peaks"],
+    resolution: Resolution,
+) -> Bool[np.ndarray, " peaks"]:
+    """Tell which peaks belong to a surface that faces the array and so reflects it.
+
+    All of it has nearly one range: its peaks disturb each other, and their bends mean nothing.
+    """
+    belongs = np.zeros(len(peaks), dtype=bool)
+    for flash in np.flatnonzero(as_mirror >= REFLECTED):
+        ray = peaks[flash] / np.linalg.norm(peaks[flash])
+        level = np.abs((peaks - peaks[flash]) @ ray) < 2 * resolution.along_ray
+        belongs |= level & (intensity > FACE * intensity[flash])
+    return belongs
 
 
 def _taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
@@ -110,21 +171,61 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     Lines whose confidence is at least :data:`LEAST_CONFIDENCE`. Nothing tells here whether
     one is seen directly or through another.
     """
+    coarse = coarse_resolution(echo_resolution(echo))
+    one_wave = np.maximum(looked.as_point, looked.as_mirror) >= LEAST_COHERENCE
+    # Among many facets in one range some of a wall's peaks are bent as well; but around a wall
+    # that is seen edge-on they are most of what is not on it.
+    candidates = [
+        *find_lines(looked.peaks[one_wave & ~looked.bent], coarse),
+        *find_lines(looked.peaks[one_wave], coarse, most=MOST_CANDIDATES),
+    ]
+    farthest = echo_reach(echo)[1]
+    focuses = tuple(
+        focus_within(prepare(range_profiles(echo, weights=weights)), farthest)
+        for weights in (None, _taper_weights(echo))
+    )
+    lines = _best_of(_fitted(echo, looked, candidates, *focuses), coarse)
+    in_sight = [line for line in lines if not _is_hidden(line, lines)]
+    # Behind a mirror are clouds as well: there only what is seen, not scattered twice, counts.
+    behind = np.array(
+        [
+            any(hides(line, peak) for line in in_sight)
+            and not any(lies_on(peak, line, coarse, margin=4.0) for line in in_sight)
+            for peak in looked.peaks
+        ],
+        dtype=bool,
+    )
+    ghosts = find_lines(looked.peaks[one_wave & ~looked.bent & behind], coarse)
+    for line in _best_of(_fitted(echo, looked, ghosts, *focuses), coarse):
+        if any(_overlap(line, known, coarse) for known in in_sight):
+            continue
+        on = np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
+        bent = np.count_nonzero(looked.bent & on)
+        if _is_hidden(line, in_sight) and bent <= MOST_BENT * np.count_nonzero(on):
+            in_sight.append(line)
+    return tuple(sorted(in_sight, key=lambda line: -line.level))
+
+
+def _fitted(
+    echo: Echo,
+    looked: Survey,
+    candidates: Sequence[LineCandidate],
+    plain: Focus,
+    tapered: Focus,
+) -> list[FittedLine]:
+    """Fit candidates that are no part of a line that was fitted; keep walls that are certain."""
     resolution = echo_resolution(echo)
-    coarse = _coarse_resolution(echo)
-    candidates = find_lines(looked.peaks, coarse)
-    plain = prepare(range_profiles(echo))
-    tapered = prepare(range_profiles(echo, weights=_taper_weights(echo)))
+    coarse = coarse_resolution(resolution)
     reach = echo_reach(echo)
     trials = looked.values.shape[0] * looked.values.shape[1]
     lines: list[FittedLine] = []
     for candidate in candidates:
-        middle = 0.5 * (candidate.start + candidate.end)
-        if any(_lies_on(middle, line, coarse) for line in lines):
+        ends = candidate.start, candidate.end
+        if any(all(lies_on(end, line, coarse, margin=4.0) for end in ends) for line in lines):
             continue  # a part of a wall that was followed to its ends already
         line = fit_line(
-            focus_within(plain, reach[1]),
-            focus_within(tapered, reach[1]),
+            plain,
+            tapered,
             candidate.start,
             candidate.end,
             resolution,
@@ -133,10 +234,38 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         )
         if line is None or line.confidence < LEAST_CONFIDENCE:
             continue
+        if line.level < LEAST_CONTRAST * line.background:
+            continue
         if line.length < LEAST_CELLS * float(resolution.cell(line.middle, line.direction)):
             continue
+        across = np.array([line.direction[1], -line.direction[0], 0.0])
+        uncertain = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
+        if np.any(uncertain > MOST_UNCERTAIN * float(resolution.cell(line.middle, across))):
+            continue
         lines.append(line)
-    return tuple(sorted(lines, key=lambda line: -line.level))
+    return lines
+
+
+def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine]:
+    """Of lines that lie on each other keep the one with the most energy along it."""
+    kept: list[FittedLine] = []
+    for line in sorted(lines, key=lambda one: -one.level * one.length):
+        if not any(_overlap(line, one, coarse) for one in kept):
+            kept.append(line)
+    return kept
+
+
+def _overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
+    """Tell whether a good part of a line lies on another."""
+    points = np.linspace(line.start, line.end, 9)
+    return bool(np.mean([lies_on(point, other, coarse) for point in points]) > 1 / 3)
+
+
+def _is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
+    """Tell whether a good part of a line is behind others."""
+    points = np.linspace(line.start, line.end, 9)
+    before = [other for other in others if other is not line]
+    return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
 
 
 def focus_within(focuser: Focuser, farthest: float) -> Focus:
@@ -157,20 +286,20 @@ def loose_peaks(
     echo: Echo, looked: Survey, lines: Sequence[FittedLine]
 ) -> Float[np.ndarray, "peaks 3"]:
     """Return the survey's peaks that lie neither on a wall nor behind one, strongest first."""
-    resolution = _coarse_resolution(echo)
+    resolution = coarse_resolution(echo_resolution(echo))
     return np.array(
         [
             peak
-            for peak in looked.peaks
-            if not any(_lies_on(peak, line, resolution, margin=4.0) for line in lines)
+            for peak in looked.peaks[~looked.bent]
+            if not any(lies_on(peak, line, resolution, margin=4.0) for line in lines)
             and not any(hides(line, peak) for line in lines)
         ]
     ).reshape(-1, 3)
 
 
-def _coarse_resolution(echo: Echo) -> Resolution:
+def coarse_resolution(fine: Resolution) -> Resolution:
     """Return the resolution of the survey, which its taper widens."""
-    fine, wider = echo_resolution(echo), TAPER.half_power_width / HALF_POWER
+    wider = TAPER.half_power_width / HALF_POWER
     return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
 
 
@@ -181,7 +310,7 @@ def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
     return hit is not None and hit[0] < far
 
 
-def _lies_on(
+def lies_on(
     point: Float[np.ndarray, " 3"],
     line: FittedLine,
     resolution: Resolution,

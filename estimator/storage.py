@@ -14,14 +14,20 @@ Layout (dimensions in brackets)::
 
 import shutil
 import tempfile
+from collections.abc import AsyncIterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from zarr.storage import LocalStore, WrapperStore
 
 from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
 
 FORMAT = 1
+
+TRUTH = "truth"
+"""Group that holds what only a comparison may know."""
 
 
 def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
@@ -94,12 +100,14 @@ def write_measurement(
         raise MeasurementError(
             f"{path} exists and is not a measurement store; move it away or choose another name"
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
+    missing = [parent for parent in path.parents if not parent.exists()]
+    aside: Path | None = None
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
         _write_group(aside / "new", measurement_to_dataset(measurement), group=None)
         if truth is not None:
-            _write_group(aside / "new", truth, group="truth")
+            _write_group(aside / "new", truth, group=TRUTH)
         # A non-empty folder cannot be replaced in one step: move the old store out first.
         try:
             if path.exists():
@@ -110,7 +118,11 @@ def write_measurement(
                 (aside / "old").rename(path)
             raise
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        if aside is not None:
+            shutil.rmtree(aside, ignore_errors=True)
+        for parent in missing:  # innermost first; the first that is not empty stays
+            with suppress(OSError):
+                parent.rmdir()
 
 
 def is_store(path: Path) -> bool:
@@ -143,7 +155,8 @@ def read_measurement(path: Path, *, sample: int | None = None) -> Measurement:
             "`mmslam import` converts measured data into a measurement store"
         )
     try:
-        with xr.open_zarr(path, consolidated=False, chunks=None) as lazy:
+        store = _WithoutTruth(LocalStore(path, read_only=True))
+        with xr.open_zarr(store, consolidated=False, chunks=None) as lazy:
             if len(lazy.variables) == 0:
                 raise MeasurementError(f"{path}: a Zarr group without arrays; nothing to locate")
             dataset = _one_sample(path, lazy, sample).load()
@@ -155,6 +168,19 @@ def read_measurement(path: Path, *, sample: int | None = None) -> Measurement:
             "it may be truncated: write it again"
         ) from error
     return _measurement(path, dataset)
+
+
+class _WithoutTruth(WrapperStore[LocalStore]):
+    """A store in which the truth cannot be seen.
+
+    Opening a group asks what lies in it, and so would read the truth's metadata.
+    """
+
+    async def list_dir(self, prefix: str) -> AsyncIterator[str]:
+        """List what lies in a folder, but for the truth in the root."""
+        async for name in super().list_dir(prefix):
+            if prefix.strip("/") or name.strip("/") != TRUTH:
+                yield name
 
 
 def _write_group(store: Path, dataset: xr.Dataset, *, group: str | None) -> None:

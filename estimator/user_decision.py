@@ -1,41 +1,58 @@
-"""From a user's paths and the walls to a position, or to the reason why there is none."""
+"""From a user's paths and the walls to a position, or to the reason why there is none.
+
+Every path may come over the mirrors that its ray meets, or over others that it only just misses.
+Each choice of paths and chains of mirrors is one hypothesis; those whose joint least squares
+leave no more over than their covariances allow are consistent. The one that explains most energy
+is the answer, paths that it does not explain are dropped, and it is ambiguous if another
+consistent one explains nearly as much elsewhere.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from estimator.estimate import UserEstimate
-from estimator.paths import Path
-from estimator.projection import Projection, Wall, project
+from estimator.estimate import PathReport, UserEstimate
+from estimator.path_consensus import Consensus, Sighting, block_covariance, solve_position
+from estimator.paths import Path, PathSet
+from estimator.projection import Wall, mirrored, project
+from estimator.straight_way import unseen_mirror, what_stands_in_the_way
 
-AGREE = float(chi2.ppf(0.999, df=2))
-"""Squared distance, over its covariance, within which two positions are the same. [-]."""
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
 END_DEVIATIONS = 3.0
-LOOSE_PEAKS = 12
-"""Strongest loose peaks between which an unseen wall is suspected."""
+"""Deviations of the angle, beside the image's cell, by which a ray may meet another wall. [-]."""
+SAME = float(chi2.ppf(0.999, df=2))
+"""Squared distance, over its covariance, within which two positions are the same. [-]."""
+SHARP = 10.0
+"""A position known this many times better than the distance of its alternative cannot have
+been hit by chance: two paths agree there. [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hypothesis:
-    """Where one path puts the user."""
+class Surroundings:
+    """What is known of the room, in the array's frame."""
 
-    path: Path
-    projection: Projection
+    walls: tuple[Wall, ...]  # mirrors at their true place
+    wall_covariance: Float[np.ndarray, "parameters parameters"]  # of all walls' (angle, offset)
+    cell: float  # how well the image tells where a wall ends, as an angle [rad]
+    imaged: bool  # whether there was an echo: without, nothing is known of mirrors
+    loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
 
 
 def decide(
     name: str,
-    paths: Sequence[Path],
+    found: PathSet,
     walls: Sequence[Wall],
     *,
     cell: float,
     imaged: bool,
     loose: Float[np.ndarray, "peaks 3"],
+    wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
+    clock_known: bool = True,
 ) -> UserEstimate:
     """Locate a user in the array's frame.
 
@@ -43,8 +60,8 @@ def decide(
     ----------
     name
         The user's.
-    paths
-        Strongest first.
+    found
+        Its paths.
     walls
         Mirrors at their true place.
     cell
@@ -53,58 +70,113 @@ def decide(
         Whether there was an echo at all: without, nothing is known of mirrors.
     loose
         Peaks of the image that lie on no wall, strongest first. [m]
+    wall_covariance
+        Of (angle, offset) of all walls, one after the other; ``None``: that of each alone.
+    clock_known
+        Whether delays are lengths; if not, the offset is found from two or more paths.
 
     Returns
     -------
     ``found`` with the position that the paths agree on; ``ambiguous`` if strong paths
-    contradict each other, the reflection is at a wall's very end, or a wall that is too
-    smooth to be seen may be in the way, with the alternatives;
+    contradict each other, the reflection is at a wall's very end, a wall that is too smooth to
+    be seen may be in the way, or one path alone has no known clock, with the alternatives;
     ``not_found`` with the reason.
     """
-    if not paths:
+    if not found.paths:
         return UserEstimate(name=name, status="not_found", reason="no wave stands out of the pilot")
-    specular = [path for path in paths if path.specular]
-    scattered = [path for path in paths if not path.specular]
-    if sum(path.share for path in scattered) > sum(path.share for path in specular):
-        strongest = max(scattered, key=lambda path: path.share)
-        return UserEstimate(name=name, status="not_found", reason=_why_none(strongest))
-    hypotheses = [
-        Hypothesis(
-            path=path,
-            projection=project(
-                path.wave.aoa, path.wave.path_length, walls, covariance=path.wave.covariance
-            ),
-        )
-        for path in specular
-    ]
-    groups = _agreeing(hypotheses)
-    answers = [_joined(name, group) for group in groups]
-    energy = [sum(member.path.share for member in group) for group in groups]
-    best = int(np.argmax(energy))
-    rivals = [
-        answer
-        for answer, share, index in zip(answers, energy, range(len(groups)), strict=True)
-        if index != best and share > RIVAL * energy[best]
-    ]
-    answer = answers[best]
-    if rivals:
-        reason = "paths of like strength end at different places"
-        return replace(answer, status="ambiguous", reason=reason, alternatives=tuple(rivals))
-    other = _past_the_end(name, groups[best][0], walls, cell)
-    if other is not None:
-        reason = "the path meets a wall at its very end: it may pass beside it"
-        return replace(answer, status="ambiguous", reason=reason, alternatives=(other,))
-    other = _over_an_unseen_wall(name, groups[best][0], loose)
-    if other is not None:
-        reason = (
-            "the straight way passes between two points that may be the ends of a wall too smooth "
-            "to be seen; over such a wall the user is elsewhere"
-        )
-        return replace(answer, status="ambiguous", reason=reason, alternatives=(other,))
-    if not imaged:
+    room = Surroundings(
+        walls=tuple(walls),
+        wall_covariance=block_covariance(walls) if wall_covariance is None else wall_covariance,
+        cell=cell,
+        imaged=imaged,
+        loose=loose,
+    )
+    answer = (_on_our_clock if clock_known else _on_any_clock)(name, found, room)
+    if answer.status == "found" and not imaged:
         reason = "no echo was measured, so mirrors are unknown; this is the place without any"
-        return replace(answer, status="ambiguous", reason=reason)
+        answer = replace(answer, status="ambiguous", reason=reason, line_of_sight=None)
     return answer
+
+
+def _on_our_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate:
+    specular = [index for index, path in enumerate(found.paths) if path.specular]
+    scattered = [path for path in found.paths if not path.specular]
+    energy = sum(found.paths[index].share for index in specular)
+    if sum(path.share for path in scattered) > energy:
+        strongest = max(scattered, key=lambda path: path.share)
+        return UserEstimate(
+            name=name,
+            status="not_found",
+            reason=_why_none(strongest),
+            paths=_reports(found, (), {}),
+        )
+    chains = {index: _chains(found.paths[index].wave.path_length, found.paths[index], room)
+              for index in specular}  # fmt: skip
+    observed = np.array([[path.wave.aoa, path.wave.path_length] for path in found.paths])
+    consistent = _consistent(chains, observed, found.covariance, room)
+    best = _most_explained(consistent, found, chains)
+    answer = _placed(name, best, found, room, chains)
+    rivals = _rivals(best, consistent, found, chains)
+    if rivals:
+        return _ambiguous(
+            answer,
+            "paths of like strength end at different places",
+            [_placed(name, rival, found, room, chains) for rival in rivals],
+        )
+    others = _other_chains(best, consistent)
+    if others:
+        reason = "the path meets a wall at its very end: it may pass beside it"
+        if len(best.sightings) > 1:
+            reason = "the same paths agree over other walls as well"
+        return _ambiguous(
+            answer, reason, [_placed(name, other, found, room, chains) for other in others]
+        )
+    if len(best.sightings) > 1:
+        return answer
+    return _if_nothing_stands_in_the_way(answer, found, best, room)
+
+
+def _on_any_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate:
+    """Find the clock's offset from two paths, or say what one path leaves open."""
+    chains = {
+        index: _chains(path.free.radius, path, room) for index, path in enumerate(found.paths)
+    }
+    observed = np.array(
+        [[path.free.aoa, path.free.path_length, path.free.radius] for path in found.paths]
+    )
+    consistent = _consistent(chains, observed, found.free_covariance, room)
+    best = _most_explained(consistent, found, chains)
+    answer = _placed(name, best, found, room, chains)
+    if len(best.sightings) > 1:
+        rivals = _rivals(best, consistent, found, chains) + _other_chains(best, consistent)
+        if rivals:
+            return _ambiguous(
+                answer,
+                "other paths, or other walls, give another place and another clock offset",
+                [_placed(name, rival, found, room, chains) for rival in rivals],
+            )
+        return answer
+    path = found.paths[best.sightings[0].path]
+    assert answer.clock_offset is not None
+    assert answer.clock_deviation is not None
+    said = f"{1e9 * answer.clock_offset:.3f} ± {1e9 * answer.clock_deviation:.3f} ns"
+    if not path.specular:
+        return _ambiguous(
+            answer,
+            "the user's clock offset is unknown, and one path alone tells it by its wavefront's "
+            f"curvature only ({said}); this is the place if no edge or rough patch scattered it",
+            [],
+        )
+    plain = _on_our_clock(name, found, room)
+    if plain.position is None:
+        return plain
+    return replace(
+        plain,
+        status="ambiguous",
+        reason="the user's clock offset is unknown, and one path alone cannot tell it: this is the "
+        f"place if it is 0, which the wavefront's curvature agrees with ({said})",
+        alternatives=(*plain.alternatives, replace(answer, status="ambiguous")),
+    )
 
 
 def _why_none(path: Path) -> str:
@@ -121,97 +193,220 @@ def _why_none(path: Path) -> str:
     )
 
 
-def _agreeing(hypotheses: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
-    """Group hypotheses with the strongest one that they agree with."""
-    groups: list[list[Hypothesis]] = []
-    for hypothesis in hypotheses:
-        for group in groups:
-            first = group[0].projection
-            between = (hypothesis.projection.position - first.position)[:2]
-            spread = (hypothesis.projection.covariance + first.covariance)[:2, :2]
-            if between @ np.linalg.solve(spread, between) < AGREE:
-                group.append(hypothesis)
-                break
-        else:
-            groups.append([hypothesis])
-    return groups
+Chains = dict[int, tuple[tuple[int, ...], ...]]
+"""For each path the chains of mirrors it may come over, the one that its ray meets first."""
 
 
-def _joined(name: str, group: Sequence[Hypothesis]) -> UserEstimate:
-    """Weigh agreeing positions by their covariances; path and angle are the strongest's."""
-    information, weighted = np.zeros((2, 2)), np.zeros(2)
-    for member in group:
-        precision = np.linalg.inv(member.projection.covariance[:2, :2])
-        information += precision
-        weighted += precision @ member.projection.position[:2]
-    covariance = np.zeros((3, 3))
-    covariance[:2, :2] = np.linalg.inv(information)
-    position: Float[np.ndarray, " 3"] = np.append(covariance[:2, :2] @ weighted, 0.0)
-    strongest = group[0]
-    return replace(
-        _placed(name, strongest.path, strongest.projection),
-        status="found",
-        position=position,
-        covariance=covariance,
-        path=np.vstack([strongest.projection.path[:-1], position]),
-    )
+def _chains(length: float, path: Path, room: Surroundings) -> tuple[tuple[int, ...], ...]:
+    aoa, covariance = path.wave.aoa, np.zeros((2, 2))
+    deviation = END_DEVIATIONS * float(np.sqrt(path.wave.covariance[0, 0]))
+    met = [
+        project(aoa + turn, length, room.walls, covariance=covariance).walls
+        for turn in (0.0, room.cell + deviation, -room.cell - deviation)
+    ]
+    return tuple(dict.fromkeys(met))
 
 
-def _placed(name: str, path: Path, projection: Projection) -> UserEstimate:
-    """Tell where one path ends, as one of several answers."""
+def _consistent(
+    chains: Chains,
+    observed: Float[np.ndarray, "paths kinds"],
+    covariance: Float[np.ndarray, "observations observations"],
+    room: Surroundings,
+) -> list[Consensus]:
+    """Solve all choices of paths and chains; two paths never come over the same mirrors."""
+    choices = [
+        [None, *(Sighting(path=index, chain=chain) for chain in options)]
+        for index, options in chains.items()
+    ]
+    consistent = []
+    for choice in product(*choices):
+        sightings = [one for one in choice if one is not None]
+        if sightings and len({one.chain for one in sightings}) == len(sightings):
+            solved = solve_position(
+                sightings, observed, covariance, room.walls, room.wall_covariance
+            )
+            if solved.agrees:
+                consistent.append(solved)
+    return consistent
+
+
+def _energy(consensus: Consensus, found: PathSet) -> float:
+    return sum(found.paths[one.path].share for one in consensus.sightings)
+
+
+def _most_explained(consistent: Sequence[Consensus], found: PathSet, chains: Chains) -> Consensus:
+    def rank(one: Consensus) -> tuple[float, int, float]:
+        straight = sum(chains[seen.path][0] == seen.chain for seen in one.sightings)
+        return round(_energy(one, found), 9), straight, -one.mismatch
+
+    return max(consistent, key=rank)
+
+
+def _rivals(
+    best: Consensus, consistent: Sequence[Consensus], found: PathSet, chains: Chains
+) -> list[Consensus]:
+    """Return what the paths that the answer does not explain say, if they are strong."""
+    rivals: list[Consensus] = []
+    used = {one.path for one in best.sightings}
+    while True:
+        others = [
+            one
+            for one in consistent
+            if not used & {seen.path for seen in one.sightings}
+            and _energy(one, found) > RIVAL * _energy(best, found)
+            and not _same_place(one, best)
+        ]
+        if not others:
+            return rivals
+        rivals.append(_most_explained(others, found, chains))
+        used |= {one.path for one in rivals[-1].sightings}
+
+
+def _other_chains(best: Consensus, consistent: Sequence[Consensus]) -> list[Consensus]:
+    """Return where the answer's paths end if they come over other mirrors.
+
+    If two paths or more agree sharply, each of them alone over other mirrors is refuted.
+    """
+    paths = {one.path for one in best.sightings}
+    others = []
+    for one in consistent:
+        theirs = {seen.path for seen in one.sightings}
+        if one is best or not theirs <= paths or _same_place(one, best):
+            continue
+        if theirs < paths and _refutes(best, one):
+            continue
+        others.append(one)
+    return others
+
+
+def _refutes(best: Consensus, other: Consensus) -> bool:
+    reach = np.sqrt(SAME * float(np.linalg.eigvalsh(best.covariance[:2, :2]).max()))
+    return bool(np.linalg.norm(best.position - other.position) > SHARP * reach)
+
+
+def _same_place(one: Consensus, other: Consensus) -> bool:
+    between = (one.position - other.position)[:2]
+    spread = (one.covariance + other.covariance)[:2, :2]
+    return bool(between @ np.linalg.solve(spread, between) < SAME)
+
+
+def _placed(
+    name: str, consensus: Consensus, found: PathSet, room: Surroundings, chains: Chains
+) -> UserEstimate:
+    """Tell where a consensus puts the user; path and angle are those of its strongest path."""
+    strongest = min(consensus.sightings, key=lambda one: one.path)
+    wave = found.paths[strongest.path].wave
+    vertices = _vertices(consensus.position, [room.walls[i] for i in strongest.chain])
     return UserEstimate(
         name=name,
-        status="ambiguous",
-        position=projection.position,
-        covariance=projection.covariance,
-        bounces=len(projection.walls),
-        aoa=path.wave.aoa,
-        path_length=path.wave.path_length,
-        path=projection.path,
+        status="found",
+        position=consensus.position,
+        covariance=consensus.covariance,
+        bounces=len(strongest.chain),
+        aoa=wave.aoa,
+        path_length=wave.path_length,
+        path=vertices,
+        line_of_sight=any(not one.chain for one in consensus.sightings),
+        paths=_reports(found, consensus.sightings, chains),
+        clock_offset=consensus.clock_offset,
+        clock_deviation=consensus.clock_deviation,
     )
 
 
-def _past_the_end(
-    name: str, hypothesis: Hypothesis, walls: Sequence[Wall], cell: float
-) -> UserEstimate | None:
-    """Return the place of a user whose ray passes a wall that it only just meets or misses."""
-    wave, met = hypothesis.path.wave, hypothesis.projection.walls
-    deviation = END_DEVIATIONS * float(np.sqrt(wave.covariance[0, 0]))
-    for turn in (cell + deviation, -cell - deviation):
-        turned = project(wave.aoa + turn, wave.path_length, walls, covariance=wave.covariance)
-        if turned.walls != met:
-            chain = [walls[index] for index in turned.walls]
-            place = project(wave.aoa, wave.path_length, _endless(chain), covariance=wave.covariance)
-            return _placed(name, hypothesis.path, place)
-    return None
+def _vertices(
+    user: Float[np.ndarray, " 3"], chain: Sequence[Wall]
+) -> Float[np.ndarray, "vertices 3"]:
+    """Draw the path from the array over mirrors to the user, wherever these end. [m]."""
+    images = [user]
+    for wall in reversed(chain):
+        images.append(mirrored(images[-1], wall.start, wall.end))
+    place = np.zeros(3)
+    vertices = [place]
+    for wall, image in zip(chain, images[:0:-1], strict=True):
+        along = wall.end - wall.start
+        normal = np.array([along[1], -along[0], 0.0])
+        ahead = image - place
+        share = float((wall.start - place) @ normal) / float(ahead @ normal)
+        place = place + share * ahead
+        vertices.append(place)
+    return np.stack([*vertices, user])
 
 
-def _endless(walls: Sequence[Wall]) -> list[Wall]:
-    """Lengthen walls by a half to either side, so that a ray just beside one meets it."""
-    return [
-        replace(
-            wall,
-            start=wall.start - 0.5 * (wall.end - wall.start),
-            end=wall.end + 0.5 * (wall.end - wall.start),
+def _reports(
+    found: PathSet, sightings: Sequence[Sighting], chains: Chains
+) -> tuple[PathReport, ...]:
+    used = {one.path: one.chain for one in sightings}
+    reports = []
+    for index, path in enumerate(found.paths):
+        reason, mirrors = None, used.get(index)
+        if index not in chains:
+            reason = "rounder than its delay: an edge or a rough patch scattered it"
+            if path.unfolded is not None:
+                reason = "flatter than its delay: longer than what is unambiguous"
+        elif index not in used:
+            mirrors = chains[index][0]
+            reason = "it ends elsewhere than the answer"
+            if mirrors in used.values():
+                reason = "a stronger path comes over the same mirrors: scattered beside it"
+        reports.append(
+            PathReport(
+                aoa=path.wave.aoa,
+                path_length=path.wave.path_length,
+                share=path.share,
+                mirrors=mirrors,
+                used=index in used,
+                reason=reason,
+            )
         )
-        for wall in walls
-    ]
+    return tuple(reports)
 
 
-def _over_an_unseen_wall(
-    name: str, hypothesis: Hypothesis, loose: Float[np.ndarray, "peaks 3"]
-) -> UserEstimate | None:
-    """Return the user's place over a smooth wall between two loose points, if one is in the way.
+def _ambiguous(
+    answer: UserEstimate, reason: str, alternatives: Sequence[UserEstimate]
+) -> UserEstimate:
+    others = tuple(replace(other, status="ambiguous") for other in alternatives)
+    seen = {one.line_of_sight for one in (answer, *others)}
+    return replace(
+        answer,
+        status="ambiguous",
+        reason=reason,
+        alternatives=others,
+        line_of_sight=seen.pop() if len(seen) == 1 else None,
+    )
 
-    A smooth wall echoes from its ends alone, and reflects all the better.
-    """
-    if hypothesis.projection.walls:
-        return None
-    wave = hypothesis.path.wave
-    points = loose[:LOOSE_PEAKS]
-    for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
-        wall = Wall(start=points[first], end=points[second], covariance=np.zeros((2, 2)))
-        place = project(wave.aoa, wave.path_length, [wall], covariance=wave.covariance)
-        if place.walls:
-            return _placed(name, hypothesis.path, place)
-    return None
+
+def _if_nothing_stands_in_the_way(
+    answer: UserEstimate, found: PathSet, best: Consensus, room: Surroundings
+) -> UserEstimate:
+    """Doubt a straight way on which the image shows something that is no wall it knows."""
+    (only,) = best.sightings
+    if only.chain:
+        return answer
+    wave = found.paths[only.path].wave
+    mirror = unseen_mirror(wave.aoa, wave.path_length, room.loose)
+    if mirror is not None:
+        place = project(wave.aoa, wave.path_length, [mirror], covariance=wave.covariance)
+        other = replace(
+            answer,
+            position=place.position,
+            covariance=place.covariance,
+            bounces=1,
+            path=place.path,
+            line_of_sight=False,
+        )
+        return _ambiguous(
+            answer,
+            "the straight way passes between two points that may be the ends of a wall too smooth "
+            "to be seen; over such a wall the user is elsewhere",
+            [other],
+        )
+    thing = what_stands_in_the_way(wave.aoa, wave.path_length, room.loose, room.cell)
+    if thing is not None:
+        return replace(
+            answer,
+            status="ambiguous",
+            line_of_sight=None,
+            reason=f"something stands on the straight way at ({thing[0]:.3f}, {thing[1]:.3f}) m: "
+            "if it is a mirror too short to be told as one, the user is elsewhere",
+        )
+    return answer

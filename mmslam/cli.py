@@ -190,28 +190,107 @@ def locate(
         _print_outcome(outcome.result, outcome.folder, as_json)
 
 
+def _print_mapping_schema(asked: bool | None) -> None:
+    if asked:
+        from mmslam.sweep_mapping import mapping_schema
+
+        _print_json(mapping_schema())
+        raise typer.Exit
+
+
 @app.command(name="import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="A full-wave .npz file.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A folder of Touchstone files, or a .mat, HDF5, NetCDF, .csv, .npz or .npy file.",
+        ),
+    ],
     output: OutFile,
+    mapping: Annotated[
+        Path | None,
+        typer.Option(
+            "--mapping",
+            "-m",
+            metavar="FILE.toml",
+            help="Says what in SOURCE is what [SOURCE/mapping.toml, if there is one].",
+        ),
+    ] = None,
     uplink: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Which array is the pilot [uplink_beam, else the first]."
+            metavar="NAME",
+            help="Of a full-wave .npz without mapping: its pilot [uplink_beam, else the first].",
+        ),
+    ] = None,
+    schema: Annotated[
+        bool | None,
+        typer.Option(
+            "--schema",
+            callback=_print_mapping_schema,
+            is_eager=True,
+            help="Print the JSON schema of mapping files.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Import full-wave reference data into a measurement file.
+    """Import measured data into a measurement file, as a mapping file says what is what.
 
-    The .npz holds `echo` and `uplink_…` (positions x frequencies, complex),
-    `aperture_position` [m] and `frequency` [Hz]; if known, `user_position` and `wall_profile`.
+    Without a mapping, SOURCE is a full-wave reference: an .npz with `echo` and `uplink_…`
+    (positions x frequencies, complex), `aperture_position` [m] and `frequency` [Hz]; if known,
+    `user_position` and `wall_profile`.
     """
     with told_clearly():
-        from mmslam.measurement_files import import_to_file
+        from mmslam import measurement_files
 
-        measurement = import_to_file(source, uplink=uplink, path=output)
+        mapping = mapping or measurement_files.mapping_beside(source)
+        if mapping is None:
+            if source.is_dir() or (source.exists() and source.suffix.lower() != ".npz"):
+                raise typer.BadParameter(
+                    f"{source}: measured data needs --mapping FILE.toml; its keys are listed by "
+                    "`mmslam import --schema`"
+                )
+            measurement = measurement_files.import_to_file(source, uplink=uplink, path=output)
+        else:
+            if uplink is not None:
+                raise typer.BadParameter("--uplink is for data without a mapping; leave it out")
+            with stdout_kept_clean():
+                imported = measurement_files.import_measured_to_file(
+                    source, mapping=mapping, path=output
+                )
+            measurement = imported.measurement
+            for note in imported.notes:
+                typer.echo(f"mmslam: note: {note}", err=True)
         _print_written(output, measurement, as_json)
+
+
+@app.command()
+def export(
+    measurement: Annotated[Path, typer.Argument(metavar="FILE.zarr", help="The measurement.")],
+    touchstone: Annotated[
+        Path,
+        typer.Option(
+            "--touchstone", metavar="DIR", help="Folder to write: a file for each position."
+        ),
+    ],
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a measurement as Touchstone files, with the mapping that imports them again.
+
+    What an earlier export wrote to DIR is replaced; a foreign folder is refused.
+    """
+    with told_clearly():
+        from mmslam.measurement_files import export_to_touchstone
+
+        count = export_to_touchstone(measurement, sample=sample, folder=touchstone)
+        if as_json:
+            _print_json({"folder": str(touchstone), "files": count})
+        else:
+            typer.echo(f"{touchstone}: {count} Touchstone files")
 
 
 @app.command()

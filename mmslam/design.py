@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.scenario import Scenario
+from scenes.scenario import Scenario, ScenarioError
 from validation.design_table import DesignRow, design_table
 
 
@@ -39,8 +39,19 @@ def design_rows(
 
 
 def scenario_radio(scenario: Scenario) -> dict[str, Any]:
-    """Return the options of :func:`design_rows` that a scenario gives (along the array's axis)."""
+    """Return the options of :func:`design_rows` that a scenario gives (along the array's axis).
+
+    Raises
+    ------
+    ScenarioError
+        If its base station is no array.
+    """
     station = scenario.base_station
+    if station.receivers is not None:
+        raise ScenarioError(
+            f"scenario {scenario.name!r}: base_station.receivers stand by themselves; a design "
+            "is worked out for an array of elements: choose another scenario"
+        )
     spacing = station.spacing_mm
     return {
         "start_ghz": scenario.radio.start_ghz,

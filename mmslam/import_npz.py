@@ -6,7 +6,6 @@ and ``wall_profile`` (points, 3) [m]. They hold two-dimensional fields of a line
 the phase exp(-jkr), so the waves are cylindrical, and one clock served both ends.
 """
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import xarray as xr
 from jaxtyping import Complex, Float
 
 from estimator.measurement import Echo, Measurement, MeasurementError, Uplink, frequency_step
+from mmslam.numpy_files import npz_arrays
 
 PREFERRED_UPLINK = "uplink_beam"
 USER = "user"
@@ -45,7 +45,7 @@ def import_npz(path: Path, *, uplink: str | None = None) -> Imported:
     MeasurementError
         If the file is none of that kind, or an array is missing or has another shape.
     """
-    arrays = _arrays(path)
+    arrays = npz_arrays(path)
     frequencies = _real(path, arrays, "frequency", (None,))
     positions = _real(path, arrays, "aperture_position", (None, 3))
     shape = (len(positions), len(frequencies))
@@ -93,28 +93,6 @@ def _mean_line(
         direction = -direction
     along = (profile - centre) @ direction
     return centre + along.min() * direction, centre + along.max() * direction
-
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    if not path.is_file():
-        raise MeasurementError(f"{path}: no such file")
-    if not zipfile.is_zipfile(path):
-        raise MeasurementError(
-            f"{path}: not a NumPy .npz archive; write one with numpy.savez_compressed"
-        )
-    arrays = {}
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            for name in archive.files:
-                arrays[name] = archive[name]
-    except ValueError as error:  # what NumPy raises for an array of pickled objects
-        raise MeasurementError(
-            f"{path}: {error}; pickled objects are never loaded, "
-            "store plain arrays of numbers instead"
-        ) from error
-    except (OSError, EOFError, zipfile.BadZipFile) as error:
-        raise MeasurementError(f"{path}: cannot be read ({error}); copy it again") from error
-    return arrays
 
 
 def _chosen_uplink(path: Path, arrays: dict[str, np.ndarray], asked: str | None) -> str | None:

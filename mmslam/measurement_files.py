@@ -6,10 +6,13 @@ import xarray as xr
 
 from estimator.estimate import Progress
 from estimator.measurement import Measurement
-from estimator.storage import write_measurement
+from estimator.storage import read_measurement, write_measurement
 from mmslam import output
+from mmslam.export_touchstone import MAPPING, export_touchstone, refuse_foreign_touchstone
+from mmslam.import_measured import Import, import_measured
 from mmslam.import_npz import import_npz
 from mmslam.interruption import interruptions_held
+from mmslam.sweep_mapping import load_mapping
 from scenes.scenario import Scenario
 
 
@@ -45,3 +48,25 @@ def import_to_file(source: Path, *, uplink: str | None, path: Path) -> Measureme
         imported = import_npz(source, uplink=uplink)
         write_measurement(new, imported.measurement, truth=imported.truth)
     return imported.measurement
+
+
+def import_measured_to_file(source: Path, *, mapping: Path, path: Path) -> Import:
+    """Convert measured data to a measurement store, as a mapping file tells."""
+    told = load_mapping(mapping)
+    with output.replacing(path, output.refuse_foreign_store) as new:
+        imported = import_measured(source, told, base=mapping.parent)
+        write_measurement(new, imported.measurement)
+    return imported
+
+
+def mapping_beside(source: Path) -> Path | None:
+    """Return the mapping file that lies in a folder of measured data, if one does."""
+    beside = source / MAPPING
+    return beside if beside.is_file() else None
+
+
+def export_to_touchstone(source: Path, *, sample: int | None, folder: Path) -> int:
+    """Write a measurement store as a folder of Touchstone files; return their number."""
+    measurement = read_measurement(source, sample=sample)
+    with output.replacing(folder, refuse_foreign_touchstone) as new:
+        return export_touchstone(measurement, new)

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from estimator.estimate import Estimate, Image
 from estimator.measurement import Measurement
-from mmslam import output
+from mmslam import output, pictures_3d
 from validation import figures, views
 from validation.resolution_bars import draw_resolution_bars
 from validation.truth import Truth
@@ -36,6 +36,8 @@ def write_pictures(
     The files by their names; what was not measured (no echo, no uplink) has no picture.
     """
     positions = aperture(measurement)
+    if pictures_3d.in_space(estimate):
+        return _saved(folder, _drawn_in_space(estimate, positions, truth))
     drawn: dict[str, Figure] = {}
     for name, image in zip(
         output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
@@ -51,6 +53,27 @@ def write_pictures(
     if estimate.maps:
         drawn["angle_range_map.png"] = angle_range_figure(estimate)
     drawn["localization.png"] = localization_figure(estimate, positions, truth)
+    return _saved(folder, drawn)
+
+
+def _drawn_in_space(
+    estimate: Estimate, positions: Float[np.ndarray, "positions 3"], truth: Truth
+) -> dict[str, Figure]:
+    drawn: dict[str, Figure] = {}
+    for name, image in zip(
+        output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
+    ):
+        if image is not None:
+            drawn[name] = pictures_3d.volume_figure(
+                image, estimate, positions, corrected="corrected" in name
+            )
+    if estimate.direction_maps:
+        drawn["angle_range_map.png"] = pictures_3d.directions_figure(estimate)
+    drawn["localization.png"] = pictures_3d.space_figure(estimate, positions, truth)
+    return drawn
+
+
+def _saved(folder: Path, drawn: dict[str, Figure]) -> dict[str, Path]:
     paths = {}
     for name, figure in drawn.items():
         paths[name] = folder / name

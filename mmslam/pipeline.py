@@ -62,11 +62,23 @@ def run_scenario(
 
 
 def _refuse_what_cannot_be_located(scenario: Scenario) -> None:
+    if scenario.base_station.multistatic:
+        raise ScenarioError(
+            f"scenario {scenario.name!r}: its antennas stand apart (base_station.receivers or "
+            "transmitter); mirrors and users are located with a linear array that hears its own "
+            "echo. `mmslam simulate` takes any antennas"
+        )
     along, up = scenario.base_station.shape
-    if along < 2 or up > 1:
+    if along < 2:
         raise ScenarioError(
             f"base_station.elements: {along} × {up}; mirrors and users are located with a linear "
-            "array of at least 2 elements. `mmslam simulate` takes any array"
+            "array of at least 2 elements, or a planar one of at least 2 × 2. `mmslam simulate` "
+            "takes any array"
+        )
+    if up > 1 and scenario.base_station.transmit_offset is not None:
+        raise ScenarioError(
+            "base_station.transmit_offset_m: a planar array images its own echo only; leave the "
+            "offset out. `mmslam simulate` takes any antennas"
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from estimator import engine
-from estimator.estimate import Estimate, Mirror, UserEstimate
+from estimator.estimate import Estimate, Mirror, Target, UserEstimate
 from estimator.measurement import Measurement
 from mmslam.output import FORMAT
 from validation.metrics import WallError, position_error, wall_errors
@@ -70,14 +70,7 @@ def result_document(
         "versions": versions(),
         "users": [_user(user, truth) for user in (*estimate.users, *unheard)],
         "mirrors": [_mirror(mirror) for mirror in estimate.mirrors],
-        "targets": [
-            {
-                "position_m": target.position,
-                "ghost_m": target.ghost,
-                "seen_through": target.seen_through,
-            }
-            for target in estimate.targets
-        ],
+        "targets": [_target(target) for target in estimate.targets],
         "comparison": {
             "mirrors": [_wall_error(error) for error in errors],
             "walls_missed": sorted(
@@ -125,12 +118,28 @@ def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:
         "reason": user.reason,
         "estimate_m": user.position,
         "covariance_m2": user.covariance,
+        "line_of_sight": user.line_of_sight,
         "bounces": user.bounces,
+        "method": user.method,
         "aoa_deg": None if user.aoa is None else math.degrees(user.aoa),
+        "elevation_deg": None if user.elevation is None else math.degrees(user.elevation),
         "range_m": user.path_length,
         "path_m": user.path,
         "truth_m": true_position,
         "error_m": position_error(user.position, true_position),
+        "clock_offset_s": user.clock_offset,
+        "clock_deviation_s": user.clock_deviation,
+        "paths": [
+            {
+                "aoa_deg": math.degrees(path.aoa),
+                "range_m": path.path_length,
+                "share": path.share,
+                "mirrors": path.mirrors,
+                "used": path.used,
+                "reason": path.reason,
+            }
+            for path in user.paths
+        ],
         "alternatives": [_user(other, truth) for other in user.alternatives],
     }
 
@@ -139,11 +148,24 @@ def _mirror(mirror: Mirror) -> dict[str, Any]:
     return {
         "start_m": mirror.start,
         "end_m": mirror.end,
+        "corners_m": mirror.corners,
         "normal": mirror.normal,
-        "covariance": mirror.covariance,  # of the angle [rad] and the offset [m]
+        # Of the angle [rad] and the offset [m]; in 3-D of two angles and the offset.
+        "covariance": mirror.covariance,
         "confidence": mirror.confidence,
         "level_db": mirror.level_db,
         "seen_through": mirror.seen_through,
+    }
+
+
+def _target(target: Target) -> dict[str, Any]:
+    return {
+        "position_m": target.position,
+        "ghost_m": target.ghost,
+        "seen_through": target.seen_through,
+        "covariance_m2": target.covariance,
+        "level_db": target.level_db,  # over an ideal unit point target
+        "ends_m": target.ends,  # null: no wider than the resolution
     }
 
 

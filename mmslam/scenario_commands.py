@@ -8,14 +8,16 @@ import typer
 from mmslam.failures import stdout_kept_clean
 from mmslam.output import OutputError
 from scenes.library import load_scenario, scenario_names, scenario_to_toml
+from scenes.relocatable import relocatable
 from scenes.scenario import Scenario
 
 
 def list_scenarios(*, export: Path | None, as_json: bool) -> None:
     """Print the built-in scenarios, and export all of them if a folder is given."""
     scenarios = [load_scenario(name, []) for name in scenario_names()]
-    for scenario in scenarios if export else ():
-        _export_toml(scenario, export)
+    if export is not None:
+        for scenario in scenarios:
+            _export_toml(scenario, export)
     if as_json:
         listed = [{"name": found.name, "title": found.title} for found in scenarios]
         typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
@@ -47,8 +49,9 @@ def show_scenario(
     if picture is not None:
         written.append(_draw(scenario, picture))
     if export is not None:
-        written.append(_export_toml(scenario, export))
+        written += _export_toml(scenario, export)
         written += _export_meshes(scenario, export, seed)
+        written = list(dict.fromkeys(written))  # both may have written a table of permittivity
     if as_json:
         document = json.loads(scenario.model_dump_json())  # infinity becomes null
         if written:
@@ -61,11 +64,14 @@ def show_scenario(
         typer.echo(scenario_to_toml(scenario).rstrip())
 
 
-def _export_toml(scenario: Scenario, folder: Path | None) -> Path:
-    assert folder is not None
-    path = folder / f"{scenario.name}.toml"
-    _write_new(path, scenario_to_toml(scenario).encode("utf-8"))
-    return path
+def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:
+    """Write a scenario with the files that it needs, so that the folder can be moved."""
+    moved = relocatable(scenario)
+    contents = {f"{scenario.name}.toml": moved.toml.encode()}
+    contents |= {name: source.read_bytes() for name, source in moved.files.items()}
+    for name, content in contents.items():
+        _write_new(folder / name, content)
+    return [folder / name for name in contents]
 
 
 def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:

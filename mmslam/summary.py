@@ -65,7 +65,7 @@ def _user(user: Mapping[str, Any]) -> str:
 
 
 def _mirror(index: int, mirror: Mapping[str, Any], error: Mapping[str, Any]) -> str:
-    angle, offset = (mirror["covariance"][axis][axis] for axis in range(2))
+    angle, offset = (mirror["covariance"][axis][axis] for axis in (0, -1))
     line = (
         f"mirror {index}: {_point(mirror['start_m'])} to {_point(mirror['end_m'])}, "
         f"± {degrees(sqrt(angle)):.4f}° and {1e3 * sqrt(offset):.3f} mm"

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from scenes.mesh_file import placed_mesh
 from scenes.objects import (
     LARGEST_RELATIVE_RMS,
     Body,
@@ -127,12 +128,10 @@ def facet_problems(
     for name, body in objects.items():
         spacing = facet_spacing(body, shortest_wavelength)
         if isinstance(body, MeshFile):
-            from scenes.mesh_file import placed_mesh
-
             mesh = placed_mesh(body)
             counts[name] = len(mesh.faces)
             if body.facets == "cut":
-                counts[name] = mesh_facet_count(float(mesh.area), len(mesh.faces), spacing)
+                counts[name] = mesh_facet_count(mesh.area, len(mesh.faces), spacing)
             if flat:
                 counts[name] = _mesh_line_count(body, spacing)
         else:

@@ -194,13 +194,17 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
                 table["file"] = str((folder / table["file"]).resolve())
 
 
+def _is_position(value: Any) -> bool:
+    return isinstance(value, tuple) and len(value) == 3 and isinstance(value[0], int | float)
+
+
 def _plain(table: Mapping[str, Any], *, flat: bool) -> dict[str, object]:
     """Leave out what is not given and, in 2-D, the z = 0 of positions."""
     plain: dict[str, object] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
             plain[key] = _plain(value, flat=flat)
-        elif flat and isinstance(value, tuple) and len(value) == 3:
+        elif flat and _is_position(value):
             plain[key] = value[:2]
         elif value is not None:
             plain[key] = value

@@ -1,19 +1,18 @@
 """Triangle meshes from files, checked and put in their place."""
 
 import functools
-import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import trimesh
 from jaxtyping import Bool, Float
 
+from scenes.mesh_formats import READERS, read_mesh
 from scenes.objects import MeshFile
 from scenes.quantities import FARTHEST
 from scenes.scenario_error import ScenarioError
+from scenes.triangle_mesh import TriangleMesh, cleaned, distances_to_triangles
 
-FORMATS = (".ply", ".stl", ".obj", ".off")
+FORMATS = tuple(f".{kind}" for kind in READERS)
 
 LARGEST_FILE = 2 * 2**30
 """Largest mesh file that is read [byte]."""
@@ -22,7 +21,7 @@ _CHUNK = 2_000_000
 """Pairs of point and triangle held at once: some 200 MB of solid angles."""
 
 
-def placed_mesh(body: MeshFile) -> trimesh.Trimesh:
+def placed_mesh(body: MeshFile) -> TriangleMesh:
     """Read a mesh file, scale it, turn it about z, and move its origin to the centre.
 
     The triangles of a watertight mesh are wound so that their normals point outward.
@@ -30,7 +29,8 @@ def placed_mesh(body: MeshFile) -> trimesh.Trimesh:
     Raises
     ------
     ScenarioError
-        If the file is missing, empty, of a foreign format, or holds no usable triangle.
+        If the file is missing, empty, of a foreign format, holds no usable triangle, or is
+        not watertight though it is told to be solid.
     """
     path = Path(body.file)
     if path.suffix.lower() not in FORMATS:
@@ -54,48 +54,55 @@ def placed_mesh(body: MeshFile) -> trimesh.Trimesh:
 
 
 @functools.lru_cache(maxsize=16)
-def _placed(body: MeshFile, changed: int, size: int) -> trimesh.Trimesh:
-    mesh = _read(body.file)
+def _placed(body: MeshFile, changed: int, size: int) -> TriangleMesh:
+    read = _read(body.file)
     axes = np.stack([body.tangent, body.across, np.array([0.0, 0.0, 1.0])])
+    vertices = read.vertices
     if body.matrix is not None:
         affine = np.array(body.matrix).reshape(3, 4)
-        mesh.vertices = np.asarray(mesh.vertices) @ affine[:, :3].T + affine[:, 3]
-    mesh.vertices = body.centre + body.scale * np.asarray(mesh.vertices) @ axes
-    if np.abs(mesh.vertices).max() > FARTHEST:
+        vertices = vertices @ affine[:, :3].T + affine[:, 3]
+    vertices = body.centre + body.scale * vertices @ axes
+    if np.abs(vertices).max() > FARTHEST:
         raise ScenarioError(
             f"mesh file {body.file!r}: vertices must lie within {FARTHEST:g} m after "
             f"scaling by {body.scale:g}; set 'scale' to metres per unit of the file"
         )
-    if not mesh.area > 0:
-        raise ScenarioError(f"mesh file {body.file!r}: its surface has no area; export it again")
+    mesh = TriangleMesh(vertices=vertices, faces=read.faces)
+    if not mesh.areas.min() > 0:
+        raise ScenarioError(
+            f"mesh file {body.file!r}: a triangle has no area after 'scale' and 'matrix'; "
+            "correct them, or export it again"
+        )
+    if body.solid and not mesh.is_watertight:
+        raise ScenarioError(
+            f"mesh file {body.file!r}: {mesh.open_edges} of its edges do not belong to exactly "
+            "two triangles, and solid = true needs a watertight mesh; close its holes and export "
+            "it again, or set solid = false (a sheet, seen from both sides)"
+        )
     if mesh.is_watertight:
-        if not mesh.is_winding_consistent:
+        if not mesh.is_wound_one_way:
             raise ScenarioError(
                 f"mesh file {body.file!r}: it is closed, but its triangles are wound both ways; "
                 "recalculate its normals outward and export it again"
             )
         if mesh.volume < 0:
-            mesh.invert()
+            mesh = mesh.turned_inside_out()
     return mesh
 
 
-def _read(file: str) -> trimesh.Trimesh:
+def _read(file: str) -> TriangleMesh:
     kind = Path(file).suffix.lower().removeprefix(".")
-    options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     try:
         # From memory, so that a mesh cannot name other files to be read.
-        content = io.BytesIO(Path(file).read_bytes())
-        mesh = trimesh.load_mesh(content, file_type=kind, process=False, **options)
-        if not np.isfinite(mesh.vertices).all():
+        vertices, faces = read_mesh(Path(file).read_bytes(), kind)
+        if not np.isfinite(vertices).all():
             raise ValueError("a vertex is not finite")
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        mesh.update_faces(mesh.nondegenerate_faces())
-        mesh.remove_unreferenced_vertices()
-    except Exception as error:  # readers of foreign formats raise whatever they stumble over
+        mesh = cleaned(vertices, faces)
+    except (ValueError, OverflowError, OSError, MemoryError) as error:
         raise ScenarioError(
             f"mesh file {file!r}: cannot be read as {kind.upper()} ({error}); export it again"
         ) from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+    if len(mesh.faces) == 0:
         raise ScenarioError(
             f"mesh file {file!r}: holds no triangle; export the surface, not points or curves"
         )
@@ -113,10 +120,7 @@ def mesh_distance(
     for index in np.flatnonzero(around):
         near = ((points[index] >= low) & (points[index] <= high)).all(axis=-1)
         if near.any():
-            triangles = np.asarray(mesh.triangles)[near]
-            repeated = np.broadcast_to(points[index], (len(triangles), 3))
-            closest = trimesh.triangles.closest_point(triangles, repeated)  # type: ignore[no-untyped-call]
-            gap = float(np.linalg.norm(closest - points[index], axis=-1).min())
+            gap = float(distances_to_triangles(points[index], mesh.triangles[near]).min())
             distances[index] = gap if gap <= farthest else np.inf
     inside = _inside(body, points)
     return np.where(inside, -np.minimum(distances, farthest), distances)
@@ -139,7 +143,7 @@ def _inside(body: MeshFile, points: Float[np.ndarray, "points 3"]) -> Bool[np.nd
         return inside
     low, high = mesh.bounds
     candidates = np.flatnonzero(((points >= low) & (points <= high)).all(axis=-1))
-    triangles = np.asarray(mesh.triangles, dtype=np.float64)
+    triangles = mesh.triangles
     chunk = max(1, _CHUNK // len(triangles))
     for first in range(0, len(candidates), chunk):
         some = candidates[first : first + chunk]

@@ -64,8 +64,7 @@ def mesh_segments(
         If there are none, or a wall is not upright.
     """
     mesh = placed_mesh(body)
-    triangles = np.asarray(mesh.triangles, dtype=np.float64)
-    normals = np.asarray(mesh.face_normals, dtype=np.float64)
+    triangles, normals = mesh.triangles, mesh.normals
     above = triangles[:, :, 2] > 0.0
     meets = above.any(axis=1) & ~above.all(axis=1)
     if not meets.any():

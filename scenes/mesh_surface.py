@@ -7,7 +7,6 @@ their mean.
 """
 
 import numpy as np
-import trimesh
 from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -17,6 +16,7 @@ from scenes.heights import Heights
 from scenes.mesh_file import placed_mesh
 from scenes.objects import MeshFile
 from scenes.scenario_error import ScenarioError
+from scenes.triangle_mesh import TriangleMesh
 from scenes.upright_shapes import Shape
 
 FLAT = 1e-4
@@ -28,7 +28,7 @@ SHARPEST_MEAN = 0.05
 
 def mesh_is_closed(body: MeshFile) -> bool:
     """Tell whether a mesh is a watertight solid, so that only its outer side is seen."""
-    return not body.hollow and bool(placed_mesh(body).is_watertight)
+    return not body.hollow and placed_mesh(body).is_watertight
 
 
 def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
@@ -41,17 +41,15 @@ def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
     """
     mesh = placed_mesh(body)
     if body.facets == "file":
-        vertices, cells = np.array(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, int)
-        return Shape(vertices=vertices, mean_vertices=vertices, cells=cells)
-    count = mesh_facet_count(float(mesh.area), len(mesh.faces), spacing)
+        return Shape(vertices=mesh.vertices, mean_vertices=mesh.vertices, cells=mesh.faces)
+    count = mesh_facet_count(mesh.area, len(mesh.faces), spacing)
     if count * BYTES_PER_FACET > MOST_BYTES:
         raise ScenarioError(
             f"mesh file {body.file!r}: {count:.3g} facets at a spacing of {spacing * 1e3:.3g} mm "
             f"need {count * BYTES_PER_FACET / 2**30:.3g} GiB, more than {MOST_BYTES >> 30} GiB; "
             "give a larger spacing"
         )
-    faces = np.asarray(mesh.faces, dtype=np.int64)
-    vertices = np.array(mesh.vertices, dtype=np.float64)
+    vertices, faces = mesh.vertices, mesh.faces
     if heights.statistics is None:
         mean, cells, _ = refined(vertices, faces, np.zeros(len(faces), dtype=np.int64), spacing)
         return Shape(vertices=mean, mean_vertices=mean, cells=cells)
@@ -125,8 +123,11 @@ def _cut(
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
-def _flat_patches(mesh: trimesh.Trimesh) -> Int[np.ndarray, " faces"]:
-    pairs = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT]
+def _flat_patches(mesh: TriangleMesh) -> Int[np.ndarray, " faces"]:
+    one, other = np.moveaxis(mesh.normals[mesh.neighbours], 1, 0)
+    cosines = np.einsum("px,px->p", one, other)
+    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), cosines)
+    pairs = mesh.neighbours[angles < FLAT]
     links = coo_matrix(
         (np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])),
         shape=(len(mesh.faces), len(mesh.faces)),
@@ -136,11 +137,11 @@ def _flat_patches(mesh: trimesh.Trimesh) -> Int[np.ndarray, " faces"]:
 
 def _refuse_small(
     body: MeshFile,
-    mesh: trimesh.Trimesh,
+    mesh: TriangleMesh,
     patches: Int[np.ndarray, " faces"],
     correlation_length: float,
 ) -> None:
-    sizes = np.sqrt(np.bincount(patches, weights=np.asarray(mesh.area_faces)))
+    sizes = np.sqrt(np.bincount(patches, weights=mesh.areas))
     if sizes.min() < correlation_length:
         raise ScenarioError(
             f"mesh file {body.file!r}: a rough mesh needs flat faces larger than a correlation "

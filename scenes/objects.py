@@ -181,6 +181,19 @@ class MeshFile(Body):
         description="whether a closed mesh is a shell that can be seen from within, such as a "
         "room, and no solid",
     )
+    solid: bool = Field(
+        False,
+        description="whether the mesh must be watertight: an open one is refused then, and else "
+        "taken for a sheet that is seen from both sides",
+    )
+
+    @model_validator(mode="after")
+    def _solid_or_hollow(self) -> "MeshFile":
+        if self.solid and self.hollow:
+            raise PydanticCustomError(
+                "solid", "solid = true and hollow = true exclude each other; remove one"
+            )
+        return self
 
     @model_validator(mode="after")
     def _frozen_facets_are_rough_by_themselves(self) -> "MeshFile":

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
+from scenes.mesh_file import mesh_contains, mesh_distance, placed_mesh
 from scenes.objects import Box, Cylinder, MeshFile, Plate
 
 TOUCHING = 1e-6
@@ -24,7 +25,7 @@ Upright = Plate | Cylinder | Box
 def inconsistencies(
     objects: Mapping[str, Upright | MeshFile],
     *,
-    array: Float[np.ndarray, "along up 3"],
+    array: Float[np.ndarray, "along up 3"] | None,
     users: Mapping[str, Float[np.ndarray, " 3"]],
     clearance: float,
 ) -> list[str]:
@@ -35,7 +36,8 @@ def inconsistencies(
     objects
         The objects by name; a mesh is tested by its triangles and its vertices.
     array
-        Elements of the base station, in rows along its axis and columns along z. [m]
+        Elements of the base station, in rows along its axis and columns along z; None: it has
+        no array. [m]
     users
         Positions by name. [m]
     clearance
@@ -49,8 +51,10 @@ def inconsistencies(
     needed = f"{clearance * 1e3:.3g} mm (the longest wavelength)"
     found = []
     for name, body in objects.items():
-        distance, place = _nearest_of_array(body, array, clearance)
-        if distance < clearance:
+        distance, place = math.inf, np.zeros(3)
+        if array is not None:
+            distance, place = _nearest_of_array(body, array, clearance)
+        if array is not None and distance < clearance:
             found.append(
                 f"base_station.position_m = {_xyz(array.mean(axis=(0, 1)))}: the array is "
                 f"{_closeness(body, distance)} objects.{name} at {_xyz(place)} m; it must keep "
@@ -64,7 +68,7 @@ def inconsistencies(
                     f"{_closeness(body, distance)} objects.{name}; it must keep {needed} away; "
                     "move the user or the object"
                 )
-    for user, position in users.items():
+    for user, position in users.items() if array is not None else ():
         distance = float(np.linalg.norm(array - position, axis=-1).min())
         if distance < clearance:
             found.append(
@@ -77,6 +81,44 @@ def inconsistencies(
                 f"objects.{second}.centre_m = {_xyz(np.array(other.centre_m))}: the solid "
                 f"overlaps objects.{first}; solids may touch (to {TOUCHING * 1e6:g} µm), not "
                 "overlap; move or shrink one of them"
+            )
+    return found
+
+
+def crowded_antennas(
+    objects: Mapping[str, Upright | MeshFile],
+    *,
+    key: str,
+    positions: Float[np.ndarray, "positions 3"],
+    clearance: float,
+) -> list[str]:
+    """Find antennas that stand too close to an object, each by itself.
+
+    Parameters
+    ----------
+    objects
+        The objects by name.
+    key
+        Where the scenario gives the positions.
+    positions
+        Of the antennas. [m]
+    clearance
+        Distance that antennas keep from surfaces. [m]
+
+    Returns
+    -------
+    A line for each object, with the antenna that is nearest to it.
+    """
+    found = []
+    for name, body in objects.items():
+        distances = _distances(body, positions, clearance)
+        nearest = int(np.argmin(distances))
+        if distances[nearest] < clearance:
+            found.append(
+                f"{key}: the antenna at {_xyz(positions[nearest])} m is "
+                f"{_closeness(body, float(distances[nearest]))} objects.{name}; it must keep "
+                f"{clearance * 1e3:.3g} mm (the longest wavelength) away; move the antenna or "
+                "the object"
             )
     return found
 
@@ -143,8 +185,6 @@ def _distances(
     body: Upright | MeshFile, points: Float[np.ndarray, "points 3"], clearance: float
 ) -> Float[np.ndarray, " points"]:
     if isinstance(body, MeshFile):
-        from scenes.mesh_file import mesh_distance
-
         return mesh_distance(body, points, farthest=clearance)
     return signed_distance(body, points)
 
@@ -184,11 +224,9 @@ def _reach(box: Box, axis: Float[np.ndarray, " 3"]) -> float:
 
 
 def _mesh_overlap(one: Cylinder | Box | MeshFile, other: Cylinder | Box | MeshFile) -> bool:
-    from scenes.mesh_file import mesh_contains, placed_mesh
-
     for inner, outer in ((one, other), (other, one)):
         if isinstance(inner, MeshFile):
-            points = np.asarray(placed_mesh(inner).vertices, dtype=np.float64)
+            points = placed_mesh(inner).vertices
         else:
             points = inner.centre[None, :]
         if isinstance(outer, MeshFile):

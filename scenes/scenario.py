@@ -4,6 +4,7 @@ Keys carry their units (GHz, mm, m, degree, dB); the properties are SI and radia
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,12 @@ from scenes.facet_spacing import facet_problems, facet_spacing
 from scenes.geometry import with_geometry
 from scenes.impairments import Impairments
 from scenes.materials import MATERIALS, Slab
+from scenes.mesh_file import placed_mesh
+from scenes.mesh_lines import mesh_segments
+from scenes.multistatic import Arc, Places, Transmitter
+from scenes.multistatic_problems import antenna_places, multistatic_problems
 from scenes.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
+from scenes.permittivity_table import band_problem, read_permittivity_table
 from scenes.placement import inconsistencies
 from scenes.point_target import PointTarget
 from scenes.quantities import Checked, Name, Position
@@ -28,6 +34,7 @@ from scenes.scenario_error import ScenarioError, did_you_mean, problems
 __all__ = [
     "MATERIALS",
     "Antenna",
+    "Arc",
     "BaseStation",
     "Box",
     "Cosine",
@@ -39,6 +46,7 @@ __all__ = [
     "Isotropic",
     "MeshFile",
     "Noise",
+    "Places",
     "Plate",
     "PointTarget",
     "Radio",
@@ -47,6 +55,7 @@ __all__ = [
     "ScenarioError",
     "SceneObject",
     "Slab",
+    "Transmitter",
     "User",
     "parse_scenario",
 ]
@@ -112,7 +121,7 @@ class Scenario(Checked):
     def _possible(self) -> "Scenario":
         # In this order: each step relies on what those before have found sound.
         found = _dimension_problems(self) + _sample_problems(self)
-        found = found or _mesh_problems(self)
+        found = found or _mesh_problems(self) + _table_problems(self)
         found = found or [
             *_aim_problems(self),
             *_point_problems(self),
@@ -121,13 +130,21 @@ class Scenario(Checked):
             ),
             *inconsistencies(
                 self.objects,
-                array=self.base_station.element_positions.reshape(*self.base_station.shape, 3),
+                array=None
+                if self.base_station.receivers is not None
+                else self.base_station.element_positions.reshape(*self.base_station.shape, 3),
                 users={name: user.position for name, user in self.users.items()},
+                clearance=self.radio.longest_wavelength,
+            ),
+            *multistatic_problems(
+                self.base_station,
+                self.objects,
+                users=tuple(self.users),
                 clearance=self.radio.longest_wavelength,
             ),
         ]
         offset = self.base_station.transmit_offset
-        if not found and offset is not None:
+        if not found and offset is not None and self.base_station.receivers is None:
             senders = self.base_station.element_positions + offset
             found = inconsistencies(
                 self.objects,
@@ -174,14 +191,46 @@ class Scenario(Checked):
         direction: np.ndarray = offset / distance
         return direction
 
+    def element_aims(
+        self, positions: Float[np.ndarray, "elements 3"]
+    ) -> Float[np.ndarray, "elements 3"]:
+        """Return the unit vectors in which the base station's receiving antennas look.
+
+        The elements of an array look in parallel; receivers that stand by themselves look at
+        the antenna's aim each for itself.
+
+        Parameters
+        ----------
+        positions
+            Where they stand. [m]
+        """
+        antenna = self.base_station.antenna
+        if self.base_station.receivers is None:
+            return np.tile(self.aim(antenna, positions.mean(axis=0)), (len(positions), 1))
+        return np.array([self.aim(antenna, place) for place in positions])
+
+    def transmit_aims(
+        self, positions: Float[np.ndarray, "elements 3"]
+    ) -> Float[np.ndarray, "elements 3"]:
+        """Return the unit vectors in which the transmitters of the echo look.
+
+        Parameters
+        ----------
+        positions
+            Where they stand, one for each element. A transmitter that stands by itself looks
+            at its antenna's aim; those beside an array's elements look in parallel. [m]
+        """
+        station = self.base_station
+        if not station.multistatic:
+            return np.tile(self.aim(station.antenna, positions.mean(axis=0)), (len(positions), 1))
+        return np.array([self.aim(station.transmit_antenna, place) for place in positions])
+
     def object_centre(self, name: str) -> Float[np.ndarray, " 3"]:
         """Return the centre of an object; of a mesh, that of its bounding box [m]."""
         body = self.objects[name]
         if isinstance(body, MeshFile):
-            from scenes.mesh_file import placed_mesh
-
-            low, high = np.asarray(placed_mesh(body).bounds, dtype=np.float64)
-            return np.array((low + high) / 2)
+            centre: np.ndarray = placed_mesh(body).bounds.mean(axis=0)
+            return centre
         return body.centre
 
 
@@ -223,6 +272,12 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
                 f"receiver apart, echoes of one bounce only are known, and max_bounces = "
                 f"{scenario.max_bounces}; set max_bounces = 1, or leave transmit_offset_m out"
             )
+    points |= antenna_places(scenario.base_station)
+    if flat and scenario.base_station.multistatic and scenario.max_bounces > 1:
+        found.append(
+            f"max_bounces = {scenario.max_bounces}: with transmitter and receiver apart, echoes of "
+            "one bounce only are known; set max_bounces = 1, or give base_station.elements alone"
+        )
     points |= {f"points.{name}.position_m": one.position_m for name, one in scenario.points.items()}
     for name, body in scenario.objects.items():
         points[f"objects.{name}.centre_m"] = body.centre_m
@@ -265,38 +320,59 @@ def _mesh_problems(scenario: Scenario) -> list[str]:
     found = []
     for name, body in scenario.objects.items():
         if isinstance(body, MeshFile):
-            from scenes.mesh_file import placed_mesh  # trimesh takes a second to import
-
             try:
                 placed_mesh(body)
                 if scenario.dimensions == 2:
-                    from scenes.mesh_lines import mesh_segments
-
                     mesh_segments(body)
             except ScenarioError as error:
                 found.append(f"objects.{name}.file: {error}")
     return found
 
 
+def _table_problems(scenario: Scenario) -> list[str]:
+    found = []
+    for name, body in scenario.objects.items():
+        if not isinstance(body.material, Slab) or body.material.file is None:
+            continue
+        path = Path(body.material.file)
+        try:
+            table = read_permittivity_table(path)
+        except ScenarioError as error:
+            found.append(f"objects.{name}.material.file: {error}")
+            continue
+        lowest, highest = float(table.frequencies[0]), float(table.frequencies[-1])
+        if problem := band_problem(scenario.radio.frequencies, lowest, highest):
+            found.append(f"objects.{name}.material.file: {path} {problem}")
+    return found
+
+
 def _aim_problems(scenario: Scenario) -> list[str]:
     found = []
-    stations: dict[str, BaseStation | User] = {"base_station": scenario.base_station}
-    stations |= {f"users.{name}": user for name, user in scenario.users.items()}
-    for key, station in stations.items():
-        antenna = station.antenna
+    station = scenario.base_station
+    places = station.element_positions if station.receivers is not None else station.centre[None]
+    antennas = [("base_station.antenna", station.antenna, places)]
+    if station.transmitter is not None and station.transmitter.antenna is not None:
+        places = station.transmitter.positions
+        antennas.append(("base_station.transmitter.antenna", station.transmitter.antenna, places))
+    antennas += [
+        (f"users.{name}.antenna", user.antenna, user.position[None])
+        for name, user in scenario.users.items()
+    ]
+    for key, antenna, places in antennas:
         if not isinstance(antenna, Directive):
             continue
         if antenna.aim is not None and antenna.aim not in scenario.objects:
             known = ", ".join(scenario.objects) or "none"
             found.append(
-                f"{key}.antenna.aim = {antenna.aim!r}: no such object"
+                f"{key}.aim = {antenna.aim!r}: no such object"
                 f"{did_you_mean(antenna.aim, scenario.objects)}; known: {known}"
             )
             continue
         try:
-            scenario.aim(antenna, np.array(station.position_m, dtype=np.float64))
+            for place in places:
+                scenario.aim(antenna, place)
         except ScenarioError as error:
-            found.append(f"{key}.antenna: {error}")
+            found.append(f"{key}: {error}")
     return found
 
 
@@ -307,16 +383,19 @@ def _point_problems(scenario: Scenario) -> list[str]:
             "waves = 'spherical', or remove the points"
         ]
     found = []
-    stations = {"the array": scenario.base_station.element_positions}
+    station = scenario.base_station
+    stations = {"the array": station.element_positions}
+    if station.transmitter is not None:
+        stations["base_station.transmitter"] = station.transmitter.positions
     stations |= {f"users.{name}": user.position[None] for name, user in scenario.users.items()}
     clearance = scenario.radio.longest_wavelength
     for name, point in scenario.points.items():
-        for station, places in stations.items():
+        for holder, places in stations.items():
             distance = float(np.linalg.norm(places - point.position, axis=-1).min())
             if distance < clearance:
                 found.append(
                     f"points.{name}.position_m = {list(point.position_m)}: is "
-                    f"{distance * 1e3:.3g} mm from {station}; it must keep "
+                    f"{distance * 1e3:.3g} mm from {holder}; it must keep "
                     f"{clearance * 1e3:.3g} mm (the longest wavelength) away; move it"
                 )
     return found

@@ -12,7 +12,7 @@ is stretched along itself to reach it, within ten correlation lengths of the edg
 shapes stay closed, and no height is tapered.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,7 +24,8 @@ from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario, ScenarioError
 from scenes.scenario_error import did_you_mean
-from scenes.upright_shapes import upright_shape
+from scenes.tiled_faces import Reach
+from scenes.upright_shapes import in_reach, shape_in_reach, upright_shape
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +38,19 @@ class Surface:
     mean_vertices: Float[np.ndarray, "vertices 3"]  # of the smooth shape [m]
     cells: Int[np.ndarray, "cells corners"]  # indices: two per line, three per triangle
     closed: bool  # closed: only the outer side is seen; open: both sides
+    screens: Int[np.ndarray, "screens 3"] = field(
+        default_factory=lambda: np.empty((0, 3), dtype=np.int64)
+    )  # triangles where nobody looks: they only block rays
 
 
 def object_surface(
-    scenario: Scenario, name: str, *, seed: int, sample: int = 0, spacing: float | None = None
+    scenario: Scenario,
+    name: str,
+    *,
+    seed: int,
+    sample: int = 0,
+    spacing: float | None = None,
+    reach: Reach | None = None,
 ) -> Surface:
     """Cut an object of a scenario into facets and displace them by its roughness.
 
@@ -53,6 +63,8 @@ def object_surface(
     spacing
         Largest distance of neighbouring vertices; infinity makes the coarsest surface. By
         default, what the object needs (:meth:`Scenario.facet_spacing`). [m]
+    reach
+        Where facets are needed, in 3-D only; without, all over the object.
 
     Raises
     ------
@@ -73,7 +85,6 @@ def object_surface(
         raise ValueError(f"spacing = {spacing} m must be positive; give a length")
     heights = Heights(body.roughness, random_stream(seed, sample, f"roughness/{name}"))
     if isinstance(body, MeshFile):
-        # trimesh takes a second to import
         if scenario.dimensions == 2:
             from scenes.mesh_lines import lines_are_closed, mesh_lines
 
@@ -83,6 +94,10 @@ def object_surface(
             from scenes.mesh_surface import mesh_is_closed, mesh_surface
 
             shape, closed = mesh_surface(body, spacing, heights), mesh_is_closed(body)
+            shape = shape if reach is None else in_reach(shape, reach)
+    elif reach is not None:
+        shape = shape_in_reach(body, spacing, heights, reach)
+        closed = not isinstance(body, Plate)
     else:
         _refuse_too_many(name, body, spacing)
         shape, closed = upright_shape(body, spacing, heights), not isinstance(body, Plate)
@@ -93,6 +108,7 @@ def object_surface(
         mean_vertices=shape.mean_vertices,
         cells=shape.cells,
         closed=closed,
+        screens=shape.screens,
     )
 
 

@@ -1,6 +1,7 @@
 """Plates, cylinders and boxes as grids of facets: lines in 2-D, triangles in 3-D."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -8,6 +9,7 @@ from jaxtyping import Float, Int
 from scenes.facet_spacing import steps, steps_round
 from scenes.heights import Heights
 from scenes.objects import Body, Box, Cylinder, Plate
+from scenes.tiled_faces import Face, Reach, TiledFace, tiled_face
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -19,6 +21,9 @@ class Shape:
     vertices: Float[np.ndarray, "vertices 3"]  # displaced by the roughness [m]
     mean_vertices: Float[np.ndarray, "vertices 3"]  # of the smooth shape [m]
     cells: Int[np.ndarray, "cells corners"]  # outward, or to the side of the plate's normal
+    screens: Int[np.ndarray, "screens 3"] = field(
+        default_factory=lambda: np.empty((0, 3), dtype=np.int64)
+    )  # triangles where nobody looks: they only block rays
 
 
 def upright_shape(body: Plate | Cylinder | Box, spacing: float, heights: Heights) -> Shape:
@@ -44,6 +49,70 @@ def upright_shape(body: Plate | Cylinder | Box, spacing: float, heights: Heights
             return _rectangle(body, spacing, heights)
         case Box():
             return _box(body, spacing, heights)
+
+
+def shape_in_reach(
+    body: Plate | Cylinder | Box, spacing: float, heights: Heights, reach: Reach
+) -> Shape:
+    """Cut an upright object of a 3-D scene into facets where they are needed.
+
+    The heights are those of the whole object. Plates and smooth boxes are made in reach only;
+    others are made as a whole first.
+
+    Parameters
+    ----------
+    body, spacing, heights
+        See :func:`upright_shape`.
+    reach
+        Where facets are needed; elsewhere triangles only block rays.
+    """
+    match body:
+        case Plate(height_m=float() as height):
+            # Its normal, tangent x up, is that of a face with these sides.
+            along, rise = body.length_m * body.tangent, height * _UP
+            face = Face(corner=body.centre - (along + rise) / 2, first=along, second=rise)
+            return _joined([tiled_face(face, spacing, reach, heights.sheet)])
+        case Box(height_m=float() as height) if heights.statistics is None:
+            return _joined(
+                [tiled_face(face, spacing, reach, heights.sheet) for face in _faces(body, height)]
+            )
+        case _:
+            return in_reach(upright_shape(body, spacing, heights), reach)
+
+
+def in_reach(shape: Shape, reach: Reach) -> Shape:
+    """Leave only the facets in reach to scatter."""
+    corners = shape.mean_vertices[shape.cells]
+    centres = corners.mean(axis=1)
+    radius = float(np.linalg.norm(corners - centres[:, None], axis=-1).max(initial=0.0))
+    wanted = reach(centres, radius)
+    return Shape(
+        vertices=shape.vertices,
+        mean_vertices=shape.mean_vertices,
+        cells=shape.cells[wanted],
+        screens=shape.cells[~wanted],
+    )
+
+
+def _faces(box: Box, height: float) -> list[Face]:
+    sides = [box.length_m * box.tangent, box.depth_m * box.across, height * _UP]
+    corner = box.centre - (sides[0] + sides[1] + sides[2]) / 2
+    faces = []
+    for axis in range(3):
+        first, second = sides[(axis + 1) % 3], sides[(axis + 2) % 3]
+        faces.append(Face(corner=corner, first=second, second=first))
+        faces.append(Face(corner=corner + sides[axis], first=first, second=second))
+    return faces
+
+
+def _joined(faces: Sequence[TiledFace]) -> Shape:
+    starts = np.cumsum([0, *(len(face.vertices) for face in faces)])[:-1]
+    return Shape(
+        vertices=np.concatenate([face.vertices for face in faces]),
+        mean_vertices=np.concatenate([face.mean_vertices for face in faces]),
+        cells=np.concatenate([face.cells + s for face, s in zip(faces, starts, strict=True)]),
+        screens=np.concatenate([face.screens + s for face, s in zip(faces, starts, strict=True)]),
+    )
 
 
 def grid_triangles(

@@ -14,7 +14,7 @@ from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 
 
 def field_gain(
-    antenna: Antenna, aim: Float[np.ndarray, " 3"], directions: Float[np.ndarray, "*n 3"]
+    antenna: Antenna, aim: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*n 3"]
 ) -> Float[np.ndarray, "*n"]:
     """Field amplitude that an antenna radiates into, or receives from, each direction.
 
@@ -23,7 +23,7 @@ def field_gain(
     antenna
         Kind of antenna and its parameters.
     aim
-        Where the antenna looks; of any length.
+        Where the antenna looks, or each of several; of any length.
     directions
         Unit vectors from the antenna outward.
 
@@ -38,8 +38,8 @@ def field_gain(
     """
     if isinstance(antenna, Isotropic):
         return np.ones(directions.shape[:-1])
-    length = float(np.linalg.norm(aim))
-    if not (np.isfinite(length) and length > 0):
+    length = np.linalg.norm(aim, axis=-1, keepdims=True)
+    if not np.all(np.isfinite(length) & (length > 0)):
         raise ValueError(
             f"the antenna's aim {aim.tolist()} has no direction; "
             "aim it at a point other than its own position"
@@ -47,7 +47,9 @@ def field_gain(
     axis = aim / length
     # Written out: a matrix product's rounding depends on the number of threads.
     cosine = (
-        directions[..., 0] * axis[0] + directions[..., 1] * axis[1] + directions[..., 2] * axis[2]
+        directions[..., 0] * axis[..., 0]
+        + directions[..., 1] * axis[..., 1]
+        + directions[..., 2] * axis[..., 2]
     )
     cosine_off_axis = np.clip(cosine, -1.0, 1.0)
     match antenna:
@@ -116,10 +118,14 @@ def horn(off_axis: Float[np.ndarray, "*n"], *, gain_dbi: float) -> Float[np.ndar
     gain_dbi
         Gain on the axis, over isotropic. [dB]
     """
-    sigma = horn_beam_width(gain_dbi) / (2.0 * math.sqrt(math.log(2.0)))
     peak = 10.0 ** (gain_dbi / 20.0)
-    field: np.ndarray = peak * gaussian_beam(off_axis, sigma=sigma)
+    field: np.ndarray = peak * gaussian_beam(off_axis, sigma=horn_beam_sigma(gain_dbi))
     return field
+
+
+def horn_beam_sigma(gain_dbi: float) -> float:
+    """Return the standard width of a horn's field pattern, see :func:`horn`. [rad]."""
+    return horn_beam_width(gain_dbi) / (2.0 * math.sqrt(math.log(2.0)))
 
 
 def horn_beam_width(gain_dbi: float) -> float:

@@ -6,14 +6,21 @@ import numpy as np
 from jaxtyping import Complex
 
 from simulator.facets import Facets
-from simulator.ghost_echo import ghost_echo
+from simulator.ghost_echo import SeveralProgress, ghost_echo, untold
+from simulator.hidden_targets import echo_over_mirrors
+from simulator.links_in_space import scattered_in_space
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, antenna_pattern, facet_ports
 from simulator.ray_scene import facets_visible
+from simulator.sights import array_sight, in_space, sending_sight
 
 
 def simulate_echo(
-    scene: RadioScene, array: Ports | None, *, advance: Callable[[], None]
+    scene: RadioScene,
+    array: Ports | None,
+    *,
+    advance: Callable[[], None],
+    over_several: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "positions freqs"]:
     """Simulate the noise-free echo: over one bounce, in 2-D also over two and three.
 
@@ -25,6 +32,8 @@ def simulate_echo(
         Ports of the array; ``None`` if nothing scatters, or if antennas stand by themselves.
     advance
         Called for each position that is done.
+    over_several
+        Told how much is done of what comes over several surfaces.
 
     Returns
     -------
@@ -34,6 +43,11 @@ def simulate_echo(
     frequencies = scenario.radio.frequencies
     if scene.facets is not None and scenario.base_station.multistatic:
         return _link_by_link(scene, scene.facets, advance)
+    if in_space(scenario):
+        array_there = array_sight(scenario, scene.elements)
+        senders_there = sending_sight(scenario, scene.elements) or array_there
+        over_one = scattered_in_space(scene, senders_there, array_there, advance=advance)
+        return np.asarray(over_one + echo_over_mirrors(scene, senders_there, array_there))
     if array is None or scene.facets is None:
         shape = (scenario.base_station.element_count, frequencies.size)
         return np.zeros(shape, dtype=np.complex128)
@@ -53,6 +67,7 @@ def simulate_echo(
         frequencies,
         waves=scenario.waves,
         max_bounces=scenario.max_bounces,
+        progress=over_several,
     )
     return np.asarray(echo + ghosts)
 

@@ -105,7 +105,7 @@ class FacetKernel:
         terms = []
         for node in total.nodes:
             wave = dr.opaque(mi.Float, 2 * math.pi * float(node))
-            re, im = _triangle_transform(wave * first, wave * second)
+            re, im = triangle_transform(wave * first, wave * second)
             terms += [
                 amplitude * (re * cosine - im * sine),
                 amplitude * (re * sine + im * cosine),
@@ -213,7 +213,7 @@ def _turned(transmit: Any, receive: Any) -> Any:
     return mi.Float(dr.select(turn <= 1e-10, one_way, split))
 
 
-def _triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
+def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
     """Average a linear phase over triangles; see physical_optics.facet_transform. [-]."""
     mean = (first + second) * (1.0 / 3.0)
     a, b, c = -mean, first - mean, second - mean

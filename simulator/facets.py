@@ -1,13 +1,16 @@
 """Surfaces cut into facets: the scatterers of physical optics."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from scenes.shapes import Surface
 from simulator.materials import Conductor, Material
+
+CELLS_AT_ONCE = 1_000_000
+"""Cells of a surface that are made facets in one go: some 300 MB. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +29,18 @@ class Facets:
     def count(self) -> int:
         """Number of facets."""
         return len(self.sizes)
+
+    def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Facets":
+        """Choose some of the facets."""
+        return replace(
+            self,
+            centres=self.centres[chosen],
+            normals=self.normals[chosen],
+            sizes=self.sizes[chosen],
+            edges=self.edges[chosen],
+            two_sided=self.two_sided[chosen],
+            material=None if self.material is None else self.material[chosen],
+        )
 
     @property
     def extent(self) -> float:
@@ -68,9 +83,45 @@ def surface_facets(surface: Surface, material: Material | None = None) -> Facets
     material
         What all of it is made of; by default a conductor.
     """
-    corners = surface.vertices[surface.cells]
+    made = scene_facets([(surface, Conductor() if material is None else material)])
+    return replace(made, material=None)
+
+
+def scene_facets(surfaces: Sequence[tuple[Surface, Material]]) -> Facets:
+    """Make facets of the cells of several surfaces, one material for each of them.
+
+    Parameters
+    ----------
+    surfaces
+        At least one, all lines or all triangles, and what each is made of.
+    """
+    sides = surfaces[0][0].cells.shape[1] - 1
+    ends = np.cumsum([len(surface.cells) for surface, _ in surfaces])
+    count = int(ends[-1])
+    facets = Facets(
+        centres=np.empty((count, 3)),
+        normals=np.empty((count, 3)),
+        sizes=np.empty(count),
+        edges=np.empty((count, sides, 3)),
+        two_sided=np.empty(count, dtype=bool),
+        materials=tuple(material for _, material in surfaces),
+        material=np.empty(count, dtype=np.int64),
+    )
+    for index, ((surface, _), end) in enumerate(zip(surfaces, ends.tolist(), strict=True)):
+        start = end - len(surface.cells)
+        facets.two_sided[start:end] = not surface.closed
+        if facets.material is not None:
+            facets.material[start:end] = index
+        for first in range(start, end, CELLS_AT_ONCE):
+            last = min(first + CELLS_AT_ONCE, end)
+            cells = surface.cells[first - start : last - start]
+            _fill(facets, slice(first, last), surface.vertices[cells])
+    return facets
+
+
+def _fill(facets: Facets, some: slice, corners: Float[np.ndarray, "cells corners 3"]) -> None:
     edges = corners[:, 1:] - corners[:, :1]
-    if surface.cells.shape[1] == 2:
+    if edges.shape[1] == 1:
         along = edges[:, 0]
         across = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
         sizes = np.linalg.norm(along, axis=-1)
@@ -79,14 +130,8 @@ def surface_facets(surface: Surface, material: Material | None = None) -> Facets
         across = np.cross(edges[:, 0], edges[:, 1])
         doubled = np.linalg.norm(across, axis=-1)
         sizes, normals = doubled / 2, across / doubled[:, None]
-    return Facets(
-        centres=corners.mean(axis=1),
-        normals=normals,
-        sizes=sizes,
-        edges=edges,
-        two_sided=np.full(len(sizes), not surface.closed),
-        materials=(Conductor() if material is None else material,),
-    )
+    facets.centres[some], facets.normals[some] = corners.mean(axis=1), normals
+    facets.sizes[some], facets.edges[some] = sizes, edges
 
 
 def joined(parts: Sequence[Facets]) -> Facets:

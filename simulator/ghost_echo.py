@@ -19,7 +19,7 @@ diffraction around an object beyond what its lit facets radiate, and the near fi
 closer to each other than a wavelength.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise, product
@@ -63,6 +63,13 @@ OUTLINE = 64
 
 Sees = Callable[[Face, Face], Bool[np.ndarray, "one other"]]
 """Tells which facets of two faces see each other."""
+
+SeveralProgress = Callable[[int, int], None]
+"""Told how much is done, and of how much. [-]"""
+
+
+def untold(done: int, total: int) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +115,7 @@ def ghost_echo(
     waves: Waves,
     max_bounces: int = 3,
     interpolate: bool = True,
+    progress: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Sum the monostatic echoes over two and three surfaces.
 
@@ -127,6 +135,8 @@ def ghost_echo(
         Surfaces in a chain; below two there is nothing to sum.
     interpolate
         Work the waves out at few frequencies and interpolate; otherwise at every frequency.
+    progress
+        Told how many facets that chains are cut at are done.
 
     Returns
     -------
@@ -136,6 +146,7 @@ def ghost_echo(
     if max_bounces < 2:
         return echo
     seen_directly = [bool(array.visible[:, face.source].any()) for face in faces]
+    cuts: list[tuple[Face, list[tuple[bool, Passage]]]] = []
     for place, target in enumerate(faces):
         passages: list[tuple[bool, Passage]] = []
         for origin, wall in enumerate(faces):
@@ -147,15 +158,22 @@ def ghost_echo(
                 found = _passage(array, wall, target, sees, float(frequencies[-1]))
                 passages += [] if found is None else [(both, found)]
         if passages:
-            echo += _echo_of(
-                target,
-                passages,
-                array,
-                frequencies,
-                waves=waves,
-                thrice=max_bounces > 2,
-                interpolate=interpolate,
-            )
+            met = np.flatnonzero(np.any([one.seen.any(axis=0) for _, one in passages], axis=0))
+            cuts.append((target.part(met), [(both, one.part(met)) for both, one in passages]))
+    done, facets = 0, sum(target.count for target, _ in cuts)
+    for target, passages in cuts:
+        for count, part in _echo_of(
+            target,
+            passages,
+            array,
+            frequencies,
+            waves=waves,
+            thrice=max_bounces > 2,
+            interpolate=interpolate,
+        ):
+            echo += part
+            done += count
+            progress(done, facets)
     return echo
 
 
@@ -169,6 +187,7 @@ def uplink_over_surfaces(
     waves: Waves,
     max_bounces: int = 3,
     interpolate: bool = True,
+    progress: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Sum what reaches each element from one user over two and three surfaces.
 
@@ -182,16 +201,23 @@ def uplink_over_surfaces(
         The elements.
     frequencies, waves, max_bounces, interpolate
         As for :func:`ghost_echo`.
+    progress
+        Told how many chains are done.
 
     Returns
     -------
     S-parameter at each element; with cylindrical waves, field per unit line source. [-]
     """
     pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
-    for bounces in range(2, min(max_bounces, MOST_BOUNCES) + 1):
-        for chain in product(faces, repeat=bounces):
-            if all(one.surface != next_.surface for one, next_ in pairwise(chain)):
-                pilot += _pilot_over(chain, sees, user, array, frequencies, waves, interpolate)
+    chains = [
+        chain
+        for bounces in range(2, min(max_bounces, MOST_BOUNCES) + 1)
+        for chain in product(faces, repeat=bounces)
+        if all(one.surface != next_.surface for one, next_ in pairwise(chain))
+    ]
+    for done, chain in enumerate(chains, start=1):
+        pilot += _pilot_over(chain, sees, user, array, frequencies, waves, interpolate)
+        progress(done, len(chains))
     return pilot
 
 
@@ -243,17 +269,13 @@ def _echo_of(
     waves: Waves,
     thrice: bool,
     interpolate: bool,
-) -> Complex[np.ndarray, "ports freqs"]:
-    """Sum the chains that are cut at one target."""
-    kept = np.flatnonzero(np.any([one.seen.any(axis=0) for _, one in passages], axis=0))
-    target = target.part(kept)
-    passages = [(both, one.part(kept)) for both, one in passages]
+) -> Iterator[tuple[int, Complex[np.ndarray, "ports freqs"]]]:
+    """Sum the chains that are cut at one target, for some of its facets at a time."""
     spread = (1 + thrice) * max(one.bounds.spread for _, one in passages)
     materials = [target.material] + (1 + thrice) * [one.wall.material for _, one in passages]
     total = few_frequencies(frequencies, spread, materials, 2 * array.nodes, interpolate)
     row_bytes = 16 * total.nodes.size * len(array.positions) * len(passages)
     step = max(1, min(FACETS_AT_ONCE, WAVE_BYTES // row_bytes))
-    echo = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     for first in range(0, target.count, step):
         block = slice(first, min(first + step, target.count))
         here = target.part(block)
@@ -266,8 +288,7 @@ def _echo_of(
         if thrice:
             pairs = combinations_with_replacement(range(len(arriving)), 2)
             links += [(1.0 + (i != j), arriving[i], arriving[j]) for i, j in pairs]
-        echo += _linked(here, links, len(array.positions), total, waves)
-    return echo
+        yield here.count, _linked(here, links, len(array.positions), total, waves)
 
 
 def _pilot_over(

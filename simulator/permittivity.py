@@ -4,7 +4,6 @@ The permittivity is :math:`\varepsilon = \varepsilon' - j \varepsilon''` with th
 exp(+jωt), so losses have :math:`\varepsilon'' > 0`.
 """
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import epsilon_0
+
+from scenes.permittivity_table import (
+    band_problem,
+    read_permittivity_table,
+    table_problem,
+    value_problem,
+)
+from scenes.scenario_error import ScenarioError
 
 
 class MaterialError(ValueError):
@@ -66,13 +73,8 @@ class TabulatedPermittivity:
 
     def __post_init__(self) -> None:
         """Refuse a table that is no function of frequency or no passive material."""
-        rising = np.all(np.diff(self.frequencies) > 0) and np.all(self.frequencies > 0)
-        if self.frequencies.size < 2 or not rising:
-            raise MaterialError(
-                f"{self.name}: {self.frequencies.size} frequencies; a table needs at least two, "
-                "positive and increasing: sort the rows and keep one of each"
-            )
-        _check_permittivity(self.name, self.values)
+        if problem := table_problem(self.frequencies, self.values):
+            raise MaterialError(f"{self.name}: {problem}")
 
     def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
         """Interpolate the table, within the band it covers."""
@@ -153,31 +155,11 @@ def read_permittivity(path: Path) -> TabulatedPermittivity:
     MaterialError
         If the file, a column or a number cannot be read.
     """
-    columns = ("frequency_ghz", "eps_real", "eps_imag")
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            missing = [name for name in columns if name not in (reader.fieldnames or ())]
-            if missing:
-                raise MaterialError(
-                    f"{path}: the first line lacks {', '.join(missing)}; "
-                    f"it must be {','.join(columns)}"
-                )
-            rows = []
-            for row in reader:
-                try:
-                    rows.append([float(row[name]) for name in columns])
-                except (TypeError, ValueError):
-                    raise MaterialError(
-                        f"{path}, line {reader.line_num}: not three numbers; write "
-                        f"{','.join(columns)} in each line"
-                    ) from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MaterialError(f"{path}: cannot be read as a CSV table ({error})") from error
-    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
-    return TabulatedPermittivity(
-        name=str(path), frequencies=table[:, 0] * 1e9, values=table[:, 1] - 1j * table[:, 2]
-    )
+        table = read_permittivity_table(path)
+    except ScenarioError as error:
+        raise MaterialError(str(error)) from error
+    return TabulatedPermittivity(name=str(path), frequencies=table.frequencies, values=table.values)
 
 
 def conductivity(
@@ -192,22 +174,12 @@ def conductivity(
 
 
 def _check_permittivity(name: str, values: Complex[np.ndarray, " entries"]) -> None:
-    wrong = ~(np.isfinite(values) & (values.real >= 1.0) & (values.imag <= 0.0))
-    if np.any(wrong):
-        value = values[np.argmax(wrong)]
-        raise MaterialError(
-            f"{name}: {value.real:g} - {-value.imag:g}j is no permittivity of a passive "
-            "dielectric; the real part must be at least 1 and the loss at least 0"
-        )
+    if problem := value_problem(values):
+        raise MaterialError(f"{name}: {problem}")
 
 
 def _check_band(
     name: str, frequencies: Float[np.ndarray, " freqs"], lowest: float, highest: float
 ) -> None:
-    # One part in 1e9 forgives the rounding of GHz to Hz.
-    if frequencies.min() < lowest * (1 - 1e-9) or frequencies.max() > highest * (1 + 1e-9):
-        raise MaterialError(
-            f"{name} covers {lowest / 1e9:g}-{highest / 1e9:g} GHz, but the radio uses "
-            f"{frequencies.min() / 1e9:g}-{frequencies.max() / 1e9:g} GHz; "
-            "narrow the band or give a wider table"
-        )
+    if problem := band_problem(frequencies, lowest, highest):
+        raise MaterialError(f"{name} {problem}")

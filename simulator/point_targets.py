@@ -34,9 +34,10 @@ def point_echo(scene: RadioScene) -> Complex[np.ndarray, "positions freqs"]:
     for target in scene.scenario.points.values():
         back = _array_leg(scene, target.position)
         outward, station = back, scene.scenario.base_station
-        if station.transmit_offset is not None:
-            places = scene.elements + station.transmit_offset
-            outward = _leg(scene, station.antenna, places, target.position)
+        places = station.transmit_positions(scene.elements)
+        if places is not None:
+            aims = scene.scenario.transmit_aims(places)
+            outward = _leg(scene, station.transmit_antenna, places, aims, target.position)
         total += _link(scene, outward, back, target.rcs_m2)
     return total
 
@@ -50,7 +51,9 @@ def point_uplink(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements
     """
     total = _nothing(scene)
     for target in scene.scenario.points.values():
-        outward = _leg(scene, user.antenna, user.position[None], target.position)
+        place = user.position[None]
+        aims = scene.scenario.aim(user.antenna, user.position)[None]
+        outward = _leg(scene, user.antenna, place, aims, target.position)
         total += _link(scene, outward, _array_leg(scene, target.position), target.rcs_m2)
     return total
 
@@ -61,19 +64,20 @@ def _nothing(scene: RadioScene) -> Complex[np.ndarray, "elements freqs"]:
 
 
 def _array_leg(scene: RadioScene, point: Float[np.ndarray, " 3"]) -> _Leg:
-    return _leg(scene, scene.scenario.base_station.antenna, scene.elements, point)
+    aims = scene.scenario.element_aims(scene.elements)
+    return _leg(scene, scene.scenario.base_station.antenna, scene.elements, aims, point)
 
 
 def _leg(
     scene: RadioScene,
     antenna: Antenna,
     places: Float[np.ndarray, "places 3"],
+    aims: Float[np.ndarray, "places 3"],
     point: Float[np.ndarray, " 3"],
 ) -> _Leg:
     towards = point - places
     distances = np.linalg.norm(towards, axis=-1)
-    aim = scene.scenario.aim(antenna, places.mean(axis=0))
-    gains = field_gain(antenna, aim, towards / distances[:, None])
+    gains = field_gain(antenna, aims, towards / distances[:, None])
     hidden = blocked(scene.rays, places, np.broadcast_to(point, places.shape))
     return _Leg(np.where(hidden, 0.0, gains), distances)
 

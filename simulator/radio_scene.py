@@ -13,9 +13,10 @@ from scenes.materials import Slab
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario, ScenarioError
 from scenes.shapes import object_surface
+from scenes.tiled_faces import Reach
 from simulator.antennas import field_gain
 from simulator.facet_reflection import reflection_nodes
-from simulator.facets import Facets, joined, surface_facets
+from simulator.facets import Facets, scene_facets
 from simulator.ghost_echo import scattering_faces
 from simulator.impairments import position_jitter
 from simulator.materials import Absorber, Dielectric, Material, named_material
@@ -28,6 +29,8 @@ from simulator.permittivity import (
 )
 from simulator.physical_optics import Pattern, Ports, isotropic
 from simulator.ray_scene import build_scene, facets_visible
+from simulator.scene_mirrors import SceneMirrors, scene_mirrors
+from simulator.sights import array_sight, in_space, needed_reach, sending_sight
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +41,14 @@ class RadioScene:
     rays: rt.Scene
     facets: Facets | None  # None: nothing scatters
     elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
+    scattering: tuple[str, ...] = ()  # names of the objects that the facets' materials belong to
+    mirrors: SceneMirrors | None = None  # in space
+
+    def facets_of(self, name: str) -> Facets:
+        """Return the facets of one object."""
+        if self.facets is None or self.facets.material is None or name not in self.scattering:
+            raise ValueError(f"{name!r} has no facets; known: {', '.join(self.scattering)}")
+        return self.facets.part(np.flatnonzero(self.facets.material == self.scattering.index(name)))
 
     @cached_property
     def mutual_visibility(self) -> MutualVisibility:
@@ -55,21 +66,37 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
         If a material is not known over the band, or its table cannot be read.
     """
     materials = scenario_materials(scenario)  # first: it is quick, and may fail
-    surfaces = [
-        object_surface(scenario, name, seed=seed, sample=sample) for name in scenario.objects
-    ]
-    scattering = [
-        surface_facets(surface, material)
-        for surface in surfaces
-        # An absorber only blocks rays.
-        if not isinstance(material := materials[surface.name], Absorber)
-    ]
+    elements = true_elements(scenario, seed=seed, sample=sample)
+    mirrors = _mirrors(scenario, materials, elements) if in_space(scenario) else None
+    surfaces, scattering = [], {}
+    for name, material in materials.items():
+        absorbs = isinstance(material, Absorber)  # only blocks rays
+        reach: Reach | None = None
+        if mirrors is not None and not absorbs:
+            legs = mirrors.legs if name in mirrors.targets else ()
+            reach = needed_reach(scenario, elements, legs)
+        surface = object_surface(scenario, name, seed=seed, sample=sample, reach=reach)
+        surfaces.append(surface)
+        if len(surface.cells) and not absorbs:
+            scattering[name] = (surface, material)
     return RadioScene(
         scenario=scenario,
         rays=build_scene(surfaces),
-        facets=joined(scattering) if scattering else None,
-        elements=true_elements(scenario, seed=seed, sample=sample),
+        facets=scene_facets(list(scattering.values())) if scattering else None,
+        elements=elements,
+        scattering=tuple(scattering),
+        mirrors=mirrors,
     )
+
+
+def _mirrors(
+    scenario: Scenario,
+    materials: dict[str, Material],
+    elements: Float[np.ndarray, "elements 3"],
+) -> SceneMirrors:
+    array = array_sight(scenario, elements)
+    send = sending_sight(scenario, elements)
+    return scene_mirrors(scenario, materials, (array,) if send is None else (array, send))
 
 
 def true_elements(scenario: Scenario, *, seed: int, sample: int) -> Float[np.ndarray, "elements 3"]:

@@ -8,15 +8,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from scenes.antenna import Antenna
-from scenes.objects import Box, Cylinder, MeshFile, Plate
+from scenes.objects import Plate
 from scenes.scenario import Scenario
 from scenes.shapes import Surface
 from simulator.antennas import field_gain
-from simulator.materials import Absorber, Conductor, Material
-from simulator.mirrors import Mirrors, line_mirrors
+from simulator.materials import Absorber
+from simulator.mean_surfaces import mean_mirrors, mean_surfaces
+from simulator.mirrors import Mirrors
 from simulator.radio_scene import scenario_materials
 from simulator.ray_scene import blocked, build_scene
-from simulator.sionna_scene import mean_surfaces
 from simulator.specular_paths import Blocked, Chain, find_chains
 
 PLACES = 17
@@ -25,11 +25,7 @@ PLACES = 17
 MOST_PER_TARGET = 3
 """Chains of mirrors shown for one target, the shortest ones."""
 
-MOST_FACES = 64
-"""A mesh of more faces counts as curved, and is no mirror: chains grow as a power of them."""
-
 _ON_SURFACE = 2e-6  # how far off its surface a target's place is tested for occlusion [m]
-_SAME_PLANE = 1e-9  # how far apart the two triangles of a rectangle lie at most [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +33,7 @@ class ScenarioPath:
     """One specular path from the centre of the array."""
 
     end: str  # name of the user or object at its end
-    kind: Literal["user", "object"]
+    kind: Literal["user", "object", "receiver"]
     vertices: Float[np.ndarray, "vertices 3"]  # from the array onward [m]
     gain_db: float  # of both antennas in its direction, relative to their peaks [dB]
 
@@ -63,7 +59,8 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     Returns
     -------
     First the users' paths, then those to the nearest place of each object that is no plate;
-    by number of bounces.
+    by number of bounces. Where antennas stand by themselves, the path from the first transmitter
+    over each mirror to the receiver that hears it best.
 
     Raises
     ------
@@ -80,6 +77,8 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     ) -> Bool[np.ndarray, " rays"]:
         return blocked(scene, starts, ends)
 
+    if scenario.base_station.multistatic:
+        return tuple(_to_receivers(scenario, mirrors, meets))
     found = [*_to_users(scenario, mirrors, meets)]
     for surface in surfaces:
         body = scenario.objects[surface.name]
@@ -87,87 +86,6 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
             found += _to_object(scenario, surface, mirrors, meets)
     del scene
     return tuple(found)
-
-
-def mean_mirrors(
-    scenario: Scenario, surfaces: list[Surface], materials: dict[str, Material]
-) -> Mirrors:
-    """Make mirrors of the flat mean surfaces of a scenario.
-
-    Parameters
-    ----------
-    scenario
-        Its cylinders and curved meshes are no mirrors: a curved surface has no image.
-    surfaces
-        Its objects, smooth and as coarse as can be.
-    materials
-        What they are made of; absorbers are no mirrors either.
-    """
-    corners, made, rough, two_sided = [np.empty((0, 4, 3))], [], [], []
-    for surface in surfaces:
-        body, material = scenario.objects[surface.name], materials[surface.name]
-        curved = isinstance(body, MeshFile) and len(surface.cells) > MOST_FACES
-        if curved or isinstance(body, Cylinder) or isinstance(material, Absorber):
-            continue
-        flat = _flat_mirrors(surface)
-        if isinstance(body, Plate | Box) and surface.cells.shape[1] == 3:
-            flat = _quadrilaterals(flat)
-        corners.append(flat)
-        made += [material] * len(flat)
-        rough += [body.roughness.rms if body.roughness is not None else 0.0] * len(flat)
-        two_sided += [not surface.closed] * len(flat)
-    return Mirrors(
-        corners=np.concatenate(corners),
-        materials=tuple(made),
-        rms_heights=np.array(rough, dtype=np.float64),
-        two_sided=np.array(two_sided, dtype=bool),
-    )
-
-
-def _flat_mirrors(surface: Surface) -> Float[np.ndarray, "mirrors 4 3"]:
-    points = surface.vertices[surface.cells]
-    count = len(points)
-    if surface.cells.shape[1] == 3:
-        return np.concatenate([points, points[:, 2:]], axis=1)
-    return line_mirrors(
-        points[:, 0],
-        points[:, 1],
-        materials=[Conductor()] * count,
-        rms_heights=np.zeros(count),
-        two_sided=np.ones(count, dtype=bool),
-    ).corners
-
-
-def _quadrilaterals(
-    triangles: Float[np.ndarray, "triangles 4 3"],
-) -> Float[np.ndarray, "mirrors 4 3"]:
-    """Join the two triangles of each rectangle: a path over its middle has one mirror then."""
-    corners = triangles[:, :3]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    across /= np.linalg.norm(across, axis=-1, keepdims=True)
-    found = []
-    left = list(range(len(corners)))
-    while left:
-        first = left.pop(0)
-        offset = [float(across[first] @ (corners[k, 0] - corners[first, 0])) for k in left]
-        same = [
-            k
-            for k, height in zip(left, offset, strict=True)
-            if abs(height) < _SAME_PLANE and across[first] @ across[k] > 1 - 1e-12
-        ]
-        second = same[0]
-        left.remove(second)
-        # The corner of the second triangle that is not on the first one.
-        apart = [
-            min(float(np.linalg.norm(corner - other)) for other in corners[first])
-            for corner in corners[second]
-        ]
-        extra = corners[second][int(np.argmax(apart))]
-        # It lies opposite the first triangle's corner that is farthest from it.
-        farthest = int(np.argmax(np.linalg.norm(corners[first] - extra, axis=-1)))
-        a, b, c = np.roll(corners[first], -farthest, axis=0)
-        found.append(np.stack([a, b, extra, c]))
-    return np.array(found)
 
 
 def _to_users(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
@@ -189,6 +107,32 @@ def _to_users(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[
                 vertices=np.stack([centre, *chain.vertices[0], user.position]),
                 gain_db=gain,
             )
+
+
+def _to_receivers(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
+    station = scenario.base_station
+    places = station.element_positions
+    senders = station.transmit_positions(places)
+    sender = places[0] if senders is None else senders[0]
+    chains = find_chains(mirrors, sender[None], places, blocked=meets, max_bounces=1)
+    for chain in chains:
+        valid = np.flatnonzero(chain.valid[0])
+        if len(chain.vertices[0]) == 0:
+            continue  # from horn to horn: no part of the echo
+        gains = [
+            _gain_db(scenario, station.transmit_antenna, sender, departure)
+            + _gain_db(scenario, station.antenna, places[index], arrival)
+            for index, departure, arrival in zip(
+                valid, chain.departures, chain.arrivals, strict=True
+            )
+        ]
+        best = int(np.argmax(gains))
+        yield ScenarioPath(
+            end=f"receiver {valid[best]}",
+            kind="receiver",
+            vertices=np.stack([sender, *chain.vertices[best], places[valid[best]]]),
+            gain_db=gains[best],
+        )
 
 
 def _to_object(
@@ -245,7 +189,7 @@ def _places(
 
 
 def _centre(scenario: Scenario) -> Float[np.ndarray, " 3"]:
-    return np.asarray(scenario.base_station.position_m, dtype=np.float64)
+    return scenario.base_station.centre
 
 
 def _gain_db(

@@ -6,20 +6,21 @@ realisation, every facet as it is simulated, and no scattering coefficient: ``NA
 is the scenario of it, and simulates the same.
 """
 
-import tomllib
 from collections.abc import Iterator
+from typing import Any
 from xml.etree import ElementTree
 
-from scenes.library import scenario_to_toml
 from scenes.ply_file import ply_bytes
+from scenes.relocatable import relocatable
 from scenes.scenario import Scenario
 from scenes.shapes import Surface, object_surface
 from scenes.surface_mesh import surface_to_mesh
 from scenes.toml_writer import toml_text
+from simulator.mean_surfaces import mean_surfaces, rms_height
 from simulator.radio_materials import sionna_slab
 from simulator.radio_scene import scenario_materials
 from simulator.ray_scene import HALF_HEIGHT
-from simulator.sionna_scene import material_colour, mean_surfaces, rms_height
+from simulator.sionna_scene import material_colour
 
 
 def exported_files(
@@ -55,7 +56,12 @@ def exported_files(
         )
         for surface in surfaces:
             yield f"{name}_meshes/{surface.name}.ply", _ply(surface)
-    yield f"{scenario.name}_facets.toml", _facets_toml(scenario).encode()
+    moved = relocatable(scenario)
+    toml = _facets_toml(scenario, moved.tables)
+    yield f"{scenario.name}_facets.toml", toml.encode()
+    for name, source in moved.files.items():
+        if f'"{name}"' in toml:  # tables of permittivity, not the meshes that were cut
+            yield name, source.read_bytes()
 
 
 def _ply(surface: Surface) -> bytes:
@@ -90,8 +96,7 @@ def _scene_xml(scenario: Scenario, folder: str, *, frozen: bool) -> bytes:
     return text + b"\n"
 
 
-def _facets_toml(scenario: Scenario) -> str:
-    data = tomllib.loads(scenario_to_toml(scenario))
+def _facets_toml(scenario: Scenario, data: dict[str, Any]) -> str:
     bodies = data.pop("objects", {})
     if bodies:
         data["geometry"] = {
@@ -100,8 +105,9 @@ def _facets_toml(scenario: Scenario) -> str:
             "objects": {name: {"material": body["material"]} for name, body in bodies.items()},
         }
     data["name"] = f"{scenario.name}_facets"
-    for station in (data["base_station"], *data.get("users", {}).values()):
-        antenna = station["antenna"]
+    station = data["base_station"]
+    for holder in (station, station.get("transmitter", {}), *data.get("users", {}).values()):
+        antenna = holder.get("antenna", {})
         if "aim" in antenna:
             # A mesh's centre is that of its bounding box, a few micrometres off.
             centre = scenario.object_centre(antenna.pop("aim")).tolist()

@@ -8,9 +8,12 @@ import xarray as xr
 from estimator.measurement import Echo, Measurement, Uplink
 from scenes.scenario import Scenario
 from simulator.echo import simulate_echo
+from simulator.multistatic import multistatic_echo, multistatic_scene
+from simulator.physical_optics import Ports
 from simulator.point_targets import point_echo, point_uplink
 from simulator.radio_scene import facet_ports, radio_scene
 from simulator.receiver import received
+from simulator.sights import in_space
 from simulator.truth import scenario_truth
 from simulator.uplink import simulate_uplink
 
@@ -45,19 +48,35 @@ def simulate(
     ScenarioError
         If nothing at all is received.
     """
-    scene = radio_scene(scenario, seed=seed, sample=sample)
     station, frequencies = scenario.base_station, scenario.radio.frequencies
-    flaws, offset = scenario.impairments, station.transmit_offset
+    flaws = scenario.impairments
     # What the estimator is told is where the elements should stand.
     elements = station.element_positions
-    array = (
-        facet_ports(scene, scene.facets, station.antenna, scene.elements) if scene.facets else None
-    )
-    echo = simulate_echo(scene, array, advance=_counter("echo", len(elements), progress))
+    advance = _counter("echo", len(elements), progress)
+    array: Ports | None = None
+    if station.multistatic and scenario.dimensions == 3:
+        apart = multistatic_scene(scenario, seed=seed, sample=sample)
+        scene, echo = apart.radio, multistatic_echo(apart, advance=advance)
+    else:
+        scene = radio_scene(scenario, seed=seed, sample=sample)
+        if scene.facets is not None and not station.multistatic and not in_space(scenario):
+            array = facet_ports(scene, scene.facets, station.antenna, scene.elements)
+        echo = simulate_echo(
+            scene,
+            array,
+            advance=advance,
+            over_several=_teller("echo over several surfaces", progress),
+        )
     signals = {"echo": echo + point_echo(scene)}
     for name, user in scenario.users.items():
         advance = _counter(f"uplink of {name}", len(elements), progress)
-        uplink = simulate_uplink(scene, user, array, advance=advance)
+        uplink = simulate_uplink(
+            scene,
+            user,
+            array,
+            advance=advance,
+            over_several=_teller(f"uplink of {name} over several surfaces", progress),
+        )
         signals[f"uplink/{name}"] = uplink + point_uplink(scene, user)
     recorded = received(signals, scenario, seed=seed, sample=sample)
     measurement = Measurement(
@@ -65,7 +84,7 @@ def simulate(
             samples=recorded["echo"],
             positions=elements,
             frequencies=frequencies,
-            transmit_positions=None if offset is None else elements + offset,
+            transmit_positions=station.transmit_positions(elements),
         )
         if "echo" in recorded
         else None,
@@ -81,6 +100,14 @@ def simulate(
         seed=seed,
     )
     return Simulation(measurement=measurement, truth=scenario_truth(scenario))
+
+
+def _teller(stage: str, progress: Progress | None) -> Callable[[int, int], None]:
+    def tell(done: int, steps: int) -> None:
+        if progress is not None:
+            progress(stage, done, steps)
+
+    return tell
 
 
 def _counter(stage: str, steps: int, progress: Progress | None) -> Callable[[], None]:

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from scenes.materials import Slab
 from scenes.scenario import Scenario
-from scenes.shapes import Surface, object_surface
+from simulator.mean_surfaces import mean_surfaces, rms_height
 from simulator.radio_materials import ANGLE_OF_INCIDENCE, radio_material
 from simulator.radio_scene import scenario_materials
 from simulator.ray_scene import HALF_HEIGHT, build_scene
@@ -91,7 +91,7 @@ def sionna_scene(
                 display_radius=MARKER,
             )
         )
-    centre = np.asarray(scenario.base_station.position_m, dtype=np.float64)
+    centre = scenario.base_station.centre
     scene.add(
         rt.Receiver(
             "/base_station",
@@ -101,25 +101,6 @@ def sionna_scene(
         )
     )
     return scene
-
-
-def mean_surfaces(scenario: Scenario) -> list[Surface]:
-    """Cut a scenario's objects into the fewest facets, without their roughness."""
-    smooth = scenario.model_copy(
-        update={
-            "objects": {
-                name: body.model_copy(update={"roughness": None})
-                for name, body in scenario.objects.items()
-            }
-        }
-    )
-    return [object_surface(smooth, name, seed=0, spacing=np.inf) for name in smooth.objects]
-
-
-def rms_height(scenario: Scenario, name: str) -> float:
-    """Return the rms height of an object's surface, 0 if it is smooth [m]."""
-    rough = scenario.objects[name].roughness
-    return 0.0 if rough is None else rough.rms
 
 
 def material_colour(material: str | Slab) -> tuple[float, float, float]:

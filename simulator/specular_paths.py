@@ -102,6 +102,70 @@ def find_chains(
     return tuple(sorted(found, key=lambda chain: (len(chain.mirrors), chain.mirrors)))
 
 
+def trace_chain(
+    mirrors: Mirrors,
+    sequence: tuple[int, ...],
+    sources: Float[np.ndarray, "sources 3"],
+    receivers: Float[np.ndarray, "receivers 3"],
+    *,
+    blocked: Blocked,
+    receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
+) -> Chain:
+    """Find the specular paths over one given sequence of mirrors; see :func:`find_chains`."""
+    images = np.empty((len(sequence), *sources.shape))
+    latest = sources
+    for bounce, mirror in enumerate(sequence):
+        images[bounce] = latest = mirrors.images(latest, mirror)
+    ends = receivers if receiver_offsets is None else receivers + receiver_offsets
+    return _trace(mirrors, sequence, images, sources, receivers, ends, blocked)
+
+
+def unfolded_chain(
+    mirrors: Mirrors,
+    sequence: tuple[int, ...],
+    images: Float[np.ndarray, "sources 3"],
+    receivers: Float[np.ndarray, "receivers 3"],
+) -> Chain:
+    """Lay paths over a sequence of mirrors as if those were endless and nothing in the way.
+
+    Parameters
+    ----------
+    mirrors, sequence
+        The mirrors, from the source onward.
+    images
+        Images of the sources behind the last of them. [m]
+    receivers
+        Every image is linked with every receiver. [m]
+    """
+    unfolded = (receivers - images[:, None]).reshape(-1, 3)
+    lengths = np.sqrt(dot(unfolded, unfolded))
+    directions, cosines = _folded_back(mirrors, sequence, unfolded / lengths[:, None])
+    return Chain(
+        mirrors=sequence,
+        valid=np.ones((len(images), len(receivers)), dtype=bool),
+        lengths=lengths,
+        vertices=np.full((len(lengths), len(sequence), 3), np.nan),
+        cosines=cosines,
+        directions=directions,
+    )
+
+
+def _folded_back(
+    mirrors: Mirrors, sequence: tuple[int, ...], last: Float[np.ndarray, "paths 3"]
+) -> tuple[Float[np.ndarray, "paths legs 3"], Float[np.ndarray, "paths bounces"]]:
+    """Directions of all legs, and cosines of incidence, from the directions of the last leg."""
+    directions = [last]
+    for mirror in reversed(sequence):
+        directions.append(mirrors.turned(directions[-1], mirror))
+    directions = directions[::-1]
+    cosines = [
+        np.abs(dot(direction, mirrors.normals[mirror]))
+        for direction, mirror in zip(directions[1:], sequence, strict=True)
+    ]
+    stacked = np.stack(cosines, axis=-1) if sequence else np.empty((len(last), 0))
+    return np.stack(directions, axis=1), stacked
+
+
 _Images = Float[np.ndarray, "bounces sources 3"]
 
 
@@ -173,21 +237,14 @@ def _trace(
     last = images[-1] if sequence else sources
     unfolded = receivers[receiver] - last[source]
     lengths = np.linalg.norm(unfolded, axis=-1)
-    directions = [unfolded / lengths[:, None]]
-    for mirror in reversed(sequence):
-        directions.append(mirrors.turned(directions[-1], mirror))
-    directions = directions[::-1]
-    cosines = [
-        np.abs(dot(direction, mirrors.normals[mirror]))
-        for direction, mirror in zip(directions[1:], sequence, strict=True)
-    ]
+    directions, cosines = _folded_back(mirrors, sequence, unfolded / lengths[:, None])
     return Chain(
         mirrors=sequence,
         valid=valid,
         lengths=lengths,
         vertices=np.concatenate(parts),
-        cosines=np.stack(cosines, axis=-1) if sequence else np.empty((len(lengths), 0)),
-        directions=np.stack(directions, axis=1),
+        cosines=cosines,
+        directions=directions,
     )
 
 

@@ -1,6 +1,7 @@
 """A user's pilot at the array: the line of sight, and what the facets scatter of it."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from jaxtyping import Complex
@@ -8,14 +9,25 @@ from jaxtyping import Complex
 from scenes.scenario import User
 from simulator.antennas import field_gain
 from simulator.free_space import direct_wave
-from simulator.ghost_echo import uplink_over_surfaces
+from simulator.ghost_echo import SeveralProgress, untold, uplink_over_surfaces
 from simulator.line_of_sight import in_line_of_sight
+from simulator.links_in_space import scattered_in_space
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, facet_ports
+from simulator.ray_scene import blocked
+from simulator.reach import Sight
+from simulator.sights import array_sight, in_space, user_sight
+from simulator.specular_field import specular_response
+from simulator.specular_paths import find_chains
 
 
 def simulate_uplink(
-    scene: RadioScene, user: User, array: Ports | None, *, advance: Callable[[], None]
+    scene: RadioScene,
+    user: User,
+    array: Ports | None,
+    *,
+    advance: Callable[[], None],
+    over_several: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "elements freqs"]:
     """Simulate one user's noise-free pilot: direct, over one bounce, in 2-D also over more.
 
@@ -32,12 +44,22 @@ def simulate_uplink(
         Ports of the array; ``None`` if nothing scatters.
     advance
         Called for each element that is done.
+    over_several
+        Told how much is done of what comes over several surfaces.
 
     Returns
     -------
     S-parameter at each element (cylindrical waves: field). [-]
     """
     pilot: np.ndarray = _direct(scene, user)
+    if in_space(scene.scenario):
+        name = next(name for name, one in scene.scenario.users.items() if one is user)
+        sender, array_there = (
+            user_sight(scene.scenario, name),
+            array_sight(scene.scenario, scene.elements),
+        )
+        over_one = scattered_in_space(scene, sender, array_there, advance=advance)
+        return np.asarray(pilot + over_one + _over_mirrors(scene, sender, array_there))
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])
@@ -52,7 +74,7 @@ def simulate_uplink(
     both: np.ndarray = pilot + over_walls
     if not scene.facets.flat:
         return both
-    over_several: np.ndarray = uplink_over_surfaces(
+    over_more: np.ndarray = uplink_over_surfaces(
         scene.mutual_visibility.faces,
         scene.mutual_visibility,
         port,
@@ -60,8 +82,9 @@ def simulate_uplink(
         scene.scenario.radio.frequencies,
         waves=scene.scenario.waves,
         max_bounces=scene.scenario.max_bounces,
+        progress=over_several,
     )
-    return np.asarray(both + over_several)
+    return np.asarray(both + over_more)
 
 
 def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
@@ -77,3 +100,29 @@ def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freq
     seen = in_line_of_sight(scene.rays, user.position, elements)
     wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)
     return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)
+
+
+def _over_mirrors(
+    scene: RadioScene, sender: Sight, array: Sight
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Sum the specular paths over two and more mirrors, in space."""
+    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
+    if scene.mirrors is None or most < 2:
+        return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    chains = find_chains(
+        scene.mirrors.mirrors,
+        sender.positions,
+        array.positions,
+        blocked=partial(blocked, scene.rays),
+        min_bounces=2,
+        max_bounces=most,
+    )
+    response: np.ndarray = specular_response(
+        scene.mirrors.mirrors,
+        chains,
+        frequencies,
+        (1, len(array.positions)),
+        transmit=sender.pattern.towards,
+        receive=array.pattern.towards,
+    )
+    return np.asarray(response[0])

@@ -43,7 +43,7 @@ def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB
     x, columns = _inside(image.grid.x, view.left, view.right)
     y, rows = _inside(image.grid.y, view.bottom, view.top)
     magnitude, x, y = _brightest_of_blocks(magnitude[columns, rows], x, y)
-    level = _decibels(magnitude, magnitude.max(), floor_db)
+    level = decibels(magnitude, magnitude.max(), floor_db)
     dx, dy = (_half_step(axis) for axis in (x, y))
     mesh = ax.imshow(
         level.T,
@@ -55,7 +55,7 @@ def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB
         interpolation="nearest",
     )
     ax.set_facecolor("black")
-    _level_bar(ax, mesh, "magnitude relative to the peak [dB]")
+    level_bar(ax, mesh, "magnitude relative to the peak [dB]")
     return in_metres(ax, view)
 
 
@@ -95,6 +95,8 @@ def overlay_targets(ax: Axes, targets: Sequence[Target], *, colour: str = ON_DAR
     """Mark the targets at their folded places."""
     for index, target in enumerate(targets):
         ax.plot(*target.position[:2], "s", mfc="none", mec=colour, ms=7, mew=1.2)
+        if target.ends is not None:
+            ax.plot(*target.ends[:, :2].T, "-", color=colour, lw=1.2)
         ax.annotate(
             f"target {index}",
             _xy(target.position),
@@ -184,7 +186,7 @@ def draw_angle_range_map(
     magnitude, aoa, length = _brightest_of_blocks(
         np.abs(heard.values), np.degrees(heard.aoa), heard.path_length
     )
-    level = _decibels(magnitude, magnitude.max() if peak is None else peak, floor_db)
+    level = decibels(magnitude, magnitude.max() if peak is None else peak, floor_db)
     # A mesh, not a picture: angles are spaced evenly in their cosine.
     mesh = ax.pcolormesh(
         aoa,
@@ -196,7 +198,7 @@ def draw_angle_range_map(
         shading="gouraud" if enlarged else "nearest",
         rasterized=True,
     )
-    _level_bar(ax, mesh, "matched filter relative to the peak [dB]")
+    level_bar(ax, mesh, "matched filter relative to the peak [dB]")
     for estimate in () if user is None else (user, *user.alternatives):
         if estimate.aoa is None or estimate.path_length is None:
             continue
@@ -313,9 +315,10 @@ def draw_close_up(
     return ax
 
 
-def _decibels(
+def decibels(
     magnitude: Float[np.ndarray, "x y"], peak: float, floor_db: float
 ) -> Float[np.ndarray, "x y"]:
+    """Return a magnitude in decibels over a peak, no lower than a floor."""
     lowest = 10 ** (floor_db / 20) * peak
     if lowest <= 0:  # nothing at all was imaged
         return np.full_like(magnitude, floor_db)
@@ -323,7 +326,8 @@ def _decibels(
     return level
 
 
-def _level_bar(ax: Axes, mesh: ScalarMappable, label: str) -> None:
+def level_bar(ax: Axes, mesh: ScalarMappable, label: str) -> None:
+    """Add a colour bar beside a drawing, as high as that."""
     figure = ax.get_figure()
     if figure is not None:  # inset: as high as the picture, whatever its aspect
         beside = ax.inset_axes((1.02, 0.0, 0.03, 1.0))

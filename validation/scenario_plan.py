@@ -17,6 +17,7 @@ from validation import figures, views
 MATERIAL_COLOURS = {"absorber": "#3d3d3d", "metal": figures.MIRROR}
 DIELECTRIC = "#8c6d4f"
 TARGET_PATH = "#2c7a51"
+TRANSMITTER = "#8a4fa0"
 FAINT_DB = -30.0
 """Below this gain, relative to the antennas' peaks, a path is drawn faint: nobody hears it."""
 
@@ -39,6 +40,7 @@ def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = 
     outlines = {name: outline(scenario, name) for name in scenario.objects}
     users = {name: user.position for name, user in scenario.users.items()}
     points = [station.element_positions, *outlines.values()]
+    points += [] if station.transmitter is None else [station.transmitter.positions]
     points += [place[None] for place in users.values()]
     points += [target.position[None] for target in scenario.points.values()]
     view = views.view_around(np.concatenate(points))
@@ -46,19 +48,19 @@ def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = 
     ax.grid(color="#dfe4e8", lw=0.6)
     ax.set_axisbelow(True)
     ahead = station.boresight * 0.06 * size
-    ax.annotate(
-        "",
-        (station.position_m[0] + ahead[0], station.position_m[1] + ahead[1]),
-        xytext=station.position_m[:2],
-        arrowprops={"arrowstyle": "-|>", "color": figures.ARRAY},
-    )
+    if station.receivers is None:
+        ax.annotate(
+            "",
+            (float(station.centre[0] + ahead[0]), float(station.centre[1] + ahead[1])),
+            xytext=(float(station.centre[0]), float(station.centre[1])),
+            arrowprops={"arrowstyle": "-|>", "color": figures.ARRAY},
+        )
     for name, line in outlines.items():
         _draw_object(ax, scenario, name, line)
     for path in paths:
         style = path_style(path)
         ax.plot(path.vertices[:, 0], path.vertices[:, 1], zorder=2.5, **style)
-    figures.overlay_array(ax, station.element_positions)
-    beams = [(np.asarray(station.position_m), station.antenna, figures.ARRAY)]
+    beams = _station_beams(ax, scenario)
     beams += [(user.position, user.antenna, figures.USER) for user in scenario.users.values()]
     for place, antenna, colour in beams:
         _draw_beam(ax, place, scenario.aim(antenna, place), antenna, colour, _BEAM * size)
@@ -76,6 +78,43 @@ def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = 
     for name, place in users.items():
         figures.mark_user(ax, name, place)
     return figures.in_metres(ax, view)
+
+
+def _station_beams(
+    ax: Axes, scenario: Scenario
+) -> list[tuple[Float[np.ndarray, " 3"], Antenna, str]]:
+    """Mark the base station's antennas; return place, kind and colour of those with a beam.
+
+    Of many receivers the middle one shows its beam.
+    """
+    station = scenario.base_station
+    places = station.element_positions
+    if station.receivers is None:
+        figures.overlay_array(ax, places)
+        beams = [(station.centre, station.antenna, figures.ARRAY)]
+    else:
+        ax.plot(places[:, 0], places[:, 1], ".", color=figures.ARRAY, ms=5, zorder=5)
+        _label(ax, places[len(places) // 2], "receivers", figures.ARRAY)
+        beams = [(places[len(places) // 2], station.antenna, figures.ARRAY)]
+    if station.transmitter is not None:
+        senders = station.transmitter.positions
+        ax.plot(senders[:, 0], senders[:, 1], "^", color=TRANSMITTER, ms=7, zorder=6)
+        _label(ax, senders[0], "transmitter", TRANSMITTER)
+        beams.append((senders[0], station.transmit_antenna, TRANSMITTER))
+    return beams
+
+
+def _label(ax: Axes, place: Float[np.ndarray, " 3"], text: str, colour: str) -> None:
+    ax.annotate(
+        text,
+        (float(place[0]), float(place[1])),
+        xytext=(0, -13),
+        textcoords="offset points",
+        ha="center",
+        color=colour,
+        fontsize=9,
+        annotation_clip=False,
+    )
 
 
 def path_style(path: ScenarioPath) -> dict[str, Any]:

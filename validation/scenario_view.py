@@ -10,9 +10,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from scenes.scenario import Scenario
 from simulator.scenario_paths import ScenarioPath
-from simulator.sionna_scene import mean_surfaces
+from simulator.mean_surfaces import mean_surfaces
 from validation import figures
-from validation.scenario_plan import DIELECTRIC, MATERIAL_COLOURS, path_style
+from validation.scenario_plan import DIELECTRIC, MATERIAL_COLOURS, TRANSMITTER, path_style
 
 STRIP_HEIGHT = 0.12
 """Height of the strips that stand for the lines of a 2-D scene, over the scene's size [-]."""
@@ -39,6 +39,8 @@ def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()
     surfaces = mean_surfaces(scenario)
     users = {name: user.position for name, user in scenario.users.items()}
     points = [station.element_positions, *(surface.vertices for surface in surfaces)]
+    senders = station.transmitter.positions if station.transmitter is not None else None
+    points += [] if senders is None else [senders]
     points += [place[None] for place in users.values()]
     points += [target.position[None] for target in scenario.points.values()]
     low, high = (bound(np.concatenate(points), axis=0) for bound in (np.min, np.max))
@@ -63,6 +65,9 @@ def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()
     for path in paths:
         ax.plot(*path.vertices.T, **path_style(path))
     ax.plot(*station.element_positions.T, ".", color=figures.ARRAY, ms=2.5)
+    if senders is not None:
+        ax.plot(*senders.T, "^", color=TRANSMITTER, ms=7)
+        ax.text(*senders[0], "  transmitter", color=TRANSMITTER, fontsize=8)
     for name, target in scenario.points.items():
         ax.plot(*target.position[:, None], "+", color=figures.MIRROR, ms=8, mew=2)
         ax.text(*target.position, f"  {name}", color=figures.MIRROR, fontsize=8)

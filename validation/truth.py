@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,10 +20,56 @@ class Truth:
     user_position: Points = field(default_factory=dict)  # [m]
     wall_start: Points = field(default_factory=dict)  # [m]
     wall_end: Points = field(default_factory=dict)  # [m]
+    target_position: Points = field(default_factory=dict)  # centres of bodies and points [m]
+    target_size: Points = field(default_factory=dict)  # along length, depth, height [m]
+    target_angle: dict[str, float] = field(default_factory=dict)  # of the length from +x [rad]
+    target_kind: dict[str, str] = field(default_factory=dict)  # point, cylinder, box, mesh
+
+
+def front_face(
+    truth: Truth, target: str, seen_from: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, " 3"]:
+    """Return the point of a target's surface that is nearest to where it is seen from.
+
+    There an image shows the target: a post at its centre plus its radius toward the aperture.
+    Seen by way of a mirror, ``seen_from`` is the aperture's image.
+
+    Parameters
+    ----------
+    truth
+        What knows the target.
+    target
+        Its name in ``target_position``. Of a mesh, its bounding box counts; a target of
+        unknown size is a point.
+    seen_from
+        Outside of the target. [m]
+
+    Raises
+    ------
+    KeyError
+        If there is no such target.
+    """
+    centre = truth.target_position[target]
+    half = truth.target_size.get(target, np.zeros(3)) / 2
+    angle = truth.target_angle.get(target, 0.0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    local = axes @ (seen_from - centre)
+    if truth.target_kind.get(target) == "cylinder":
+        radius = float(np.hypot(local[0], local[1]))
+        local[:2] *= min(1.0, half[0] / radius) if radius > 0 else 0.0
+        local[2] = np.clip(local[2], -half[2], half[2])
+    else:
+        local = np.clip(local, -half, half)
+    face: np.ndarray = centre + axes.T @ local
+    return face
 
 
 def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
     """Take the truth out of the layout ``user_position`` (user, axis), ``wall_start`` (wall, axis).
+
+    Targets are ``target_position`` and ``target_size`` (target, axis), ``target_angle`` and
+    ``target_kind`` (target).
 
     Parameters
     ----------
@@ -40,6 +87,18 @@ def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
         user_position=_points(dataset, "user_position", "user"),
         wall_start=_points(dataset, "wall_start", "wall"),
         wall_end=_points(dataset, "wall_end", "wall"),
+        target_position=_points(dataset, "target_position", "target"),
+        target_size=_points(dataset, "target_size", "target"),
+        target_angle={
+            name: float(angle)
+            for name, angle in _values(dataset, "target_angle", "target").items()
+            if np.isfinite(angle)
+        },
+        target_kind={
+            name: str(kind)
+            for name, kind in _values(dataset, "target_kind", "target").items()
+            if str(kind)
+        },
     )
 
 
@@ -87,6 +146,22 @@ def _points(dataset: xr.Dataset, name: str, dimension: str) -> Points:
             f"they must be {dimension!r} and three of 'axis'"
         )
     values = np.asarray(variable.transpose(dimension, "axis").values, dtype=np.float64)
-    labels = dataset[dimension].values if dimension in dataset.coords else range(len(values))
-    points = zip(map(str, labels), values, strict=True)
+    points = zip(_labels(dataset, dimension), values, strict=True)
     return {label: point for label, point in points if np.all(np.isfinite(point))}
+
+
+def _values(dataset: xr.Dataset, name: str, dimension: str) -> dict[str, Any]:
+    if name not in dataset:
+        return {}
+    variable = dataset[name]
+    if variable.dims != (dimension,):
+        raise MeasurementError(
+            f"truth: {name!r} has dimensions {dict(variable.sizes)}; it must have {dimension!r}"
+        )
+    return dict(zip(_labels(dataset, dimension), variable.values, strict=True))
+
+
+def _labels(dataset: xr.Dataset, dimension: str) -> list[str]:
+    if dimension in dataset.coords:
+        return [str(label) for label in dataset[dimension].values]
+    return [str(number) for number in range(dataset.sizes[dimension])]

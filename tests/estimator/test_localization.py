@@ -292,9 +292,47 @@ def test_a_known_clock_offset_is_taken_out(room: Room) -> None:
     assert error_of(told) <= 1e-4
 
 
-def test_an_unknown_clock_is_noted(room: Room) -> None:
-    estimate = locate(room.measured(room.pilot(USER), clock_offset=None))
-    assert any("clock offset" in note for note in estimate.notes)
+def ahead(pilot: Uplink, offset: float) -> Uplink:
+    """The pilot of a clock that is ahead: it seems to arrive early."""
+    turned = pilot.samples * np.exp(2j * np.pi * pilot.frequencies * offset)
+    return replace(pilot, samples=turned)
+
+
+def test_an_unknown_clock_is_found_from_two_paths(room: Room) -> None:
+    offset = 5e-11
+    pilot = ahead(room.pilot(USER, IMAGE), offset)
+    estimate = locate(room.measured(pilot, clock_offset=None))
+    user = only(estimate)
+    assert (user.status, user.line_of_sight) == ("found", True)
+    assert user.clock_offset is not None
+    assert user.clock_deviation is not None
+    assert abs(user.clock_offset - offset) <= 5 * user.clock_deviation
+    assert user.covariance is not None
+    assert user.position is not None
+    away = (user.position - USER)[:2]
+    assert away @ np.linalg.solve(user.covariance[:2, :2], away) <= 25
+    assert any("clock offset of 'ann' is unknown; its 2 paths give" in n for n in estimate.notes)
+
+
+def test_one_path_alone_cannot_tell_an_unknown_clock(room: Room) -> None:
+    user = only(locate(room.measured(room.pilot(USER), clock_offset=None)))
+    assert user.status == "ambiguous"
+    assert error_of(user) <= 1e-4  # the place if the offset is 0, which it is
+    assert user.reason is not None
+    assert "one path alone cannot tell it" in user.reason
+    # By the curvature alone, the place is known less well, but honestly.
+    other = user.alternatives[-1]
+    assert other.position is not None
+    assert other.covariance is not None
+    away = (other.position - USER)[:2]
+    assert away @ np.linalg.solve(other.covariance[:2, :2], away) <= 25
+    assert np.trace(other.covariance) > 10 * np.trace(user.covariance)  # type: ignore[arg-type]
+
+
+def test_a_clock_that_curvature_refutes_is_never_taken_for_right(room: Room) -> None:
+    # 3 cm of 0.44 m: an answer that took the offset to be 0 would be wrong by as much.
+    user = only(locate(room.measured(ahead(room.pilot(USER), 1e-10), clock_offset=None)))
+    assert user.status == "ambiguous"
 
 
 # No confident wrong answer

@@ -12,7 +12,8 @@ from scipy.constants import speed_of_light
 from estimator.angle_range_map import angle_range_map, default_angles, default_path_lengths
 from estimator.curvature_search import search_curvature
 from estimator.measurement import Uplink
-from estimator.paths import LEAST_SHARE, Path, find_paths, noise_variance
+from estimator.paths import LEAST_SHARE, Path, find_paths
+from estimator.wavefront_error import noise_variance
 
 COUNT = 64
 BAND = np.linspace(220e9, 295e9, 126)  # 0.5 m of unambiguous path
@@ -32,7 +33,7 @@ def waves(world: Any, samples: Complex[np.ndarray, "elements freqs"]) -> tuple[P
         path_length=default_path_lengths(uplink, cells=1.5),
         centre=np.zeros(3),
     )
-    return find_paths(uplink, chart)
+    return find_paths(uplink, chart).paths
 
 
 def pilot(world: Any, place: Float[np.ndarray, " 3"], *, extra: float = 0.0) -> Any:
@@ -130,7 +131,7 @@ def test_the_noise_is_measured_beside_the_signal(world: Any) -> None:
         # The sidelobes of a wave between two of the 126 delays have a median of up to 2.3 % of
         # its power; they lift that of the noise by some of it, and hide noise far below.
         # A median of 8064 exponential variables is known to 1.1 %: four of them.
-        found = noise_variance(uplink) / power
+        found = noise_variance(uplink.samples) / power
         assert (1 - 0.045) * level <= found <= (1 + 0.045) * level + 3 * 0.023
 
 

@@ -431,6 +431,40 @@ def test_the_old_store_survives_if_the_new_one_cannot_take_its_place(
     assert_same(read_measurement(store), measurement)
 
 
+def test_folders_made_for_a_store_that_fails_are_taken_away_again(
+    measurement: Measurement, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "there").mkdir()
+
+    def refused(*args: object, **options: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(xr.Dataset, "to_zarr", refused)
+    with pytest.raises(OSError, match="No space left"):
+        write_measurement(tmp_path / "there/not/yet/a.zarr", measurement)
+    assert everything_in(tmp_path) == {"there"}
+    monkeypatch.undo()
+    write_measurement(tmp_path / "there/not/yet/a.zarr", measurement)
+    assert_same(read_measurement(tmp_path / "there/not/yet/a.zarr"), measurement)
+
+
+@pytest.mark.parametrize("damage", ["metadata", "variable", "closed"])
+def test_a_measurement_is_read_whatever_has_become_of_its_truth(
+    damage: str, measurement: Measurement, truth: xr.Dataset, tmp_path: Path
+) -> None:
+    store = tmp_path / "a.zarr"
+    write_measurement(store, measurement, truth=truth)
+    match damage:
+        case "metadata":
+            (store / "truth/zarr.json").write_text("{")
+        case "variable":
+            (store / "truth/user_position/zarr.json").write_text("[]")
+        case "closed":
+            shutil.rmtree(store / "truth")
+            (store / "truth").symlink_to("truth")  # reading it fails for every user
+    assert_same(read_measurement(store), measurement)
+
+
 def test_a_folder_that_cannot_be_written_says_so(
     measurement: Measurement, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,11 +1,15 @@
 """From waves to an answer, on waves that are written down."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from jaxtyping import Float
+from scipy.constants import speed_of_light
+from scipy.linalg import block_diag
 
 from estimator.estimate import UserEstimate
-from estimator.paths import Path
+from estimator.paths import Path, PathSet
 from estimator.projection import Wall
 from estimator.spherical_wave_fit import SphericalWave
 from estimator.user_decision import decide
@@ -62,6 +66,16 @@ SLANTED = Wall(
 )
 
 
+def together(paths: list[Path]) -> PathSet:
+    """Paths whose errors are independent."""
+    zero = np.zeros((0, 0))
+    return PathSet(
+        paths=tuple(paths),
+        covariance=block_diag(zero, *(one.wave.covariance for one in paths)),
+        free_covariance=block_diag(zero, *(one.free.covariance for one in paths)),
+    )
+
+
 def decided(
     paths: list[Path],
     walls: list[Wall],
@@ -69,7 +83,7 @@ def decided(
     imaged: bool = True,
     loose: Float[np.ndarray, "peaks 3"] = NOTHING_LOOSE,
 ) -> UserEstimate:
-    return decide("ann", paths, walls, cell=CELL, imaged=imaged, loose=loose)
+    return decide("ann", together(paths), walls, cell=CELL, imaged=imaged, loose=loose)
 
 
 def test_a_direct_path_is_the_user() -> None:
@@ -113,17 +127,100 @@ def test_direct_and_reflected_path_that_agree_are_weighed_together() -> None:
     assert gain[-1] > 0
 
 
-def test_the_weights_are_those_of_the_covariances() -> None:
-    # A path that is off by 3 mm in length and has an (unlikely) deviation of 1 mm there counts
-    # for next to nothing beside one of 0.05 mm.
-    user = np.array([0.0, 1.0, 0.0])
-    vague = path(90.0, 1.003, share=0.4)
-    vague.wave.covariance[1, 1] = 1e-6
-    found = decided([direct(user, share=0.5), vague], [])
-    assert found.status == "found"
+def test_a_path_that_contradicts_the_others_is_dropped_and_the_reason_says_so() -> None:
+    user, elsewhere = np.array([0.5, 0.75, 0.0]), np.array([-0.3, 0.4, 0.0])
+    three = [direct(user, share=0.4), reflected(user, share=0.4), direct(elsewhere, share=0.15)]
+    found = decided(three, [SLANTED])
+    assert (found.status, found.line_of_sight) == ("found", True)
+    assert [one.used for one in found.paths] == [True, True, False]
+    assert [one.mirrors for one in found.paths] == [(), (0,), ()]
+    assert found.paths[2].reason == (
+        "a stronger path comes over the same mirrors: scattered beside it"
+    )
     assert found.position is not None
-    expected = (1.0 / LENGTH**2 + 1.003 / 1e-6) / (1 / LENGTH**2 + 1 / 1e-6)
-    assert found.position[1] == pytest.approx(expected, abs=1e-9)
+    np.testing.assert_allclose(found.position, user, atol=1e-9)
+
+
+def test_two_paths_that_agree_outweigh_a_stronger_one_that_does_not() -> None:
+    user, elsewhere = np.array([0.5, 0.75, 0.0]), np.array([-0.3, 0.4, 0.0])
+    three = [direct(elsewhere, share=0.4), direct(user, share=0.3), reflected(user, share=0.28)]
+    found = decided(three, [SLANTED])
+    # The other one is strong all the same: that is said, and its place is given.
+    assert found.status == "ambiguous"
+    assert found.position is not None
+    np.testing.assert_allclose(found.position, user, atol=1e-9)
+    (other,) = found.alternatives
+    assert other.position is not None
+    np.testing.assert_allclose(other.position, elsewhere, atol=1e-9)
+
+
+def test_line_of_sight_is_stated() -> None:
+    user = np.array([0.5, 0.75, 0.0])
+    assert decided([direct(user)], [SLANTED]).line_of_sight is True
+    assert decided([reflected(user)], [SLANTED]).line_of_sight is False
+    assert decided([], [SLANTED]).line_of_sight is None
+
+
+def test_a_second_path_tells_whether_the_first_meets_a_walls_very_end() -> None:
+    # 2 mm before the wall's end: alone it could pass beside it.
+    along = np.array([1.0, 1.0]) / np.sqrt(2)
+    near = SLANTED.end[:2] - 2e-3 * along
+    ray = 1.5 * near / np.linalg.norm(near)
+    user = np.array([ray[1] - 0.8, ray[0] + 0.8, 0.0])
+    assert decided([reflected(user)], [SLANTED]).status == "ambiguous"
+    both = decided([reflected(user, share=0.5), direct(user, share=0.4)], [SLANTED])
+    assert (both.status, both.bounces, both.line_of_sight) == ("found", 1, True)
+    assert both.position is not None
+    np.testing.assert_allclose(both.position, user, atol=1e-9)
+
+
+def test_something_on_the_straight_way_may_be_a_short_mirror() -> None:
+    user = np.array([0.0, 0.9, 0.0])
+    post = np.array([[0.001, 0.5, 0.0]])
+    found = decided([direct(user)], [], loose=post)
+    assert (found.status, found.line_of_sight) == ("ambiguous", None)
+    assert found.reason is not None
+    assert "something stands on the straight way at (0.001, 0.500) m" in found.reason
+    # Beside the ray by more than two cells, or where the user itself is, it is nothing.
+    for place in ([0.03, 0.5, 0.0], [0.0, 0.89, 0.0]):
+        assert decided([direct(user)], [], loose=np.array([place])).status == "found"
+
+
+def late(paths: list[Path], walls: list[Wall]) -> UserEstimate:
+    return decide(
+        "ann", together(paths), walls, cell=CELL, imaged=True, loose=NOTHING_LOOSE,
+        clock_known=False,
+    )  # fmt: skip
+
+
+def shifted(one: Path, length: float) -> Path:
+    """The path as a clock sees it that is ahead by so many metres."""
+    free = replace(one.free, path_length=one.free.path_length - length)
+    return replace(one, wave=replace(one.wave, path_length=free.path_length), free=free)
+
+
+@pytest.mark.parametrize("length", [0.0, 0.2, -0.35])
+def test_two_paths_tell_the_offset_of_the_clock(length: float) -> None:
+    user = np.array([0.5, 0.75, 0.0])
+    both = [direct(user, share=0.5), reflected(user, share=0.4)]
+    found = late([shifted(one, length) for one in both], [SLANTED])
+    assert (found.status, found.line_of_sight) == ("found", True)
+    assert found.position is not None
+    np.testing.assert_allclose(found.position, user, atol=1e-8)
+    assert found.clock_offset == pytest.approx(length / speed_of_light, abs=1e-16)
+    assert found.clock_deviation is not None
+    # Not better than one length itself, far better than the curvature (9 mm of 0.9 m).
+    assert LENGTH < found.clock_deviation * speed_of_light < 5e-3
+
+
+def test_one_path_whose_curvature_refutes_a_true_clock_is_placed_by_its_curvature() -> None:
+    user = np.array([0.5, 0.75, 0.0])
+    found = late([shifted(direct(user), 0.4)], [SLANTED])
+    assert found.status == "ambiguous"
+    assert found.position is not None
+    np.testing.assert_allclose(found.position, user, atol=1e-9)
+    assert found.reason is not None
+    assert "curvature only (1.334 ± 0.030 ns)" in found.reason
 
 
 def test_without_waves_there_is_no_user() -> None:

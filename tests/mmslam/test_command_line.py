@@ -209,9 +209,14 @@ def test_an_import_replaces_a_measurement_and_nothing_else(away: Path) -> None:
     assert sorted(path.name for path in away.iterdir()) == ["full_wave.npz", "m.zarr", "other"]
 
 
-@pytest.mark.parametrize("elements", ["1", "[8, 8]"])
+@pytest.mark.parametrize("elements", ["1", "[1, 8]"])
 def test_an_array_that_cannot_locate_is_refused_before_the_simulation(elements: str) -> None:
     setting = [] if elements == "1" else ["--set", "dimensions=3"]
     name = "slam_2d" if elements == "1" else "bench_3d"
     setting += ["--set", f"base_station.elements={elements}"]
     assert "with a linear array" in refused("run", name, *setting)
+
+
+def test_antennas_that_stand_apart_cannot_locate_and_have_no_design() -> None:
+    assert "its antennas stand apart" in refused("run", "rcs_drywall")
+    assert "stand by themselves" in refused("design", "rcs_drywall")

@@ -5,6 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mmslam.cli import app
+from scenes.library import scenario_names
 
 
 def mmslam(*arguments: str) -> tuple[int, str, str]:
@@ -42,3 +43,45 @@ def test_a_scenario_in_three_dimensions_is_drawn() -> None:
     )
     assert (code, drawn) == (0, "b.png\n")
     assert Path("b.png").read_bytes().startswith(b"\x89PNG")
+
+
+def same_bytes(one: Path, other: Path) -> bool:
+    files = [
+        {path.relative_to(store): path.read_bytes() for path in store.rglob("*") if path.is_file()}
+        for store in (one, other)
+    ]
+    return files[0] == files[1]
+
+
+def test_an_exported_folder_can_be_moved_and_simulates_the_same(tmp_path: Path) -> None:
+    given = tmp_path / "given"
+    given.mkdir()
+    (given / "board.csv").write_text("frequency_ghz,eps_real,eps_imag\n200,2.5,0.1\n300,2.6,0.1\n")
+    cuts = ["radio.points=21", "base_station.elements=[3, 3]"]
+    cuts += [f"objects.letter.material={{file = '{given}/board.csv', thickness_mm = 3}}"]
+    options = [part for cut in cuts for part in ("--set", cut)]
+    code, listed, message = mmslam("scenes", "bench_3d", *options, "--export", "first")
+    assert code == 0, message
+    written = {"bench_3d_files/letter_f.ply", "bench_3d_files/sphere.ply"}
+    written |= {"bench_3d_files/board.csv", "bench_3d.toml", "bench_3d_facets.toml"}
+    assert {f"first/{name}" for name in written} < set(listed.split())
+    assert len(listed.split()) == len(set(listed.split()))
+    for file in Path("first").rglob("*.toml"):
+        assert str(tmp_path) not in file.read_text()
+    assert mmslam("simulate", "bench_3d", *options, "-o", "before.zarr")[0] == 0
+    Path("first").rename("elsewhere")
+    (given / "board.csv").unlink()
+    code, _, message = mmslam("simulate", "elsewhere/bench_3d.toml", "-o", "after.zarr")
+    assert code == 0, message
+    assert same_bytes(Path("before.zarr"), Path("after.zarr"))
+    code, _, message = mmslam("scenes", "elsewhere/bench_3d_facets.toml")
+    assert code == 0, message
+
+
+def test_every_scenario_is_exported_with_the_meshes_it_needs() -> None:
+    assert mmslam("scenes", "--export", "all")[0] == 0
+    Path("all").rename("moved")
+    names = {path.stem for path in Path("moved").glob("*.toml")}
+    assert names == set(scenario_names())
+    for name in names:
+        assert mmslam("scenes", f"moved/{name}.toml")[0] == 0

@@ -298,7 +298,7 @@ def test_what_toml_does_not_know_is_refused() -> None:
 def test_loading_a_scenario_imports_neither_trimesh_nor_a_ray_tracer() -> None:
     code = (
         "import sys; from scenes.library import load_scenario; from scenes.shapes import *; "
-        "object_surface(load_scenario('slam_2d'), 'wall', seed=0); "
+        "object_surface(load_scenario('slam_2d'), 'wall', seed=0); load_scenario('bench_3d'); "
         "print(sorted({'trimesh', 'mitsuba', 'drjit', 'sionna', 'matplotlib', 'xarray'} "
         "& set(sys.modules)))"
     )

@@ -10,6 +10,8 @@ from scenes.library import load_scenario, override_scenario
 from scenes.materials import MATERIALS, TEXTURES, Slab
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 
+GYPSUM = "frequency_ghz,eps_real,eps_imag\n110,2.56,0.01\n330,2.56,0.02\n"
+
 
 def scenario(**plate: Any) -> Scenario:
     body = {"kind": "plate", "centre_m": [0, 0.8], "length_m": 0.1, **plate}
@@ -71,10 +73,14 @@ def test_a_slab_has_a_permittivity_and_a_thickness() -> None:
         "drywall",
         {"name": "drywall", "thickness_mm": 9.5},
         {"permittivity": [2, 0.1], "thickness_mm": math.inf},
-        {"file": "/tables/gypsum.csv", "thickness_mm": 12.7},
+        {"file": "gypsum.csv", "thickness_mm": 12.7},
     ],
 )
-def test_a_scenario_of_a_material_is_written_and_read_back_equal(material: Any) -> None:
+def test_a_scenario_of_a_material_is_written_and_read_back_equal(
+    material: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("gypsum.csv").write_text(GYPSUM)
     scene = scenario(material=material)
     assert override_scenario(scene, []) == scene
 
@@ -98,9 +104,43 @@ file = "tables/gypsum.csv"
 thickness_mm = 12.7
 """
     (tmp_path / "mine.toml").write_text(text)
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables/gypsum.csv").write_text(GYPSUM)
     material = load_scenario(str(tmp_path / "mine.toml")).objects["it"].material
     assert isinstance(material, Slab)
     assert material.file == str((tmp_path / "tables/gypsum.csv").resolve())
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, r"gypsum\.csv: cannot be read as a CSV table .*; give the path of one"),
+        ("GHz,e\n", r"the first line lacks frequency_ghz, eps_real, eps_imag; it must be"),
+        (GYPSUM + "340,2.7\n", r"gypsum\.csv, line 4: not three numbers; write frequency_ghz"),
+        (GYPSUM + "300,2.7,0.1\n", r"3 frequencies; a table needs .* increasing: sort the rows"),
+        (GYPSUM + "400,inf,0.1\n", r"inf - 0\.1j is no permittivity of a passive dielectric"),
+        (
+            GYPSUM.replace("330", "300"),
+            r"covers 110-300 GHz, but the radio uses 220-330 GHz; narrow the band or give a wider",
+        ),
+    ],
+)
+def test_a_bad_table_is_refused_when_the_scenario_is_loaded(
+    text: str | None, message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "gypsum.csv"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ScenarioError, match=rf"objects\.it\.material\.file: .*{message}"):
+        scenario(material={"file": str(path), "thickness_mm": 12.7})
+
+
+def test_a_table_as_large_as_a_film_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "film.csv"
+    with path.open("wb") as file:
+        file.truncate(2**33)
+    with pytest.raises(ScenarioError, match="8589934592 bytes are more than a table's 10485760"):
+        scenario(material={"file": str(path), "thickness_mm": 12.7})
 
 
 BAD = [

@@ -281,6 +281,26 @@ def test_a_closed_mesh_wound_both_ways_is_refused(tmp_path: Path) -> None:
     refused("its triangles are wound both ways; recalculate its normals", mesh_table(file))
 
 
+def test_an_open_mesh_is_refused_where_a_solid_is_asked_for(tmp_path: Path) -> None:
+    mesh = cube()
+    mesh.update_faces(np.arange(len(mesh.faces)) > 0)
+    refused(
+        r"^objects\.it\.file: .*: 3 of its edges do not belong to exactly two triangles, and "
+        r"solid = true needs a watertight mesh; close its holes .* or set solid = false",
+        mesh_table(saved(tmp_path, mesh), solid=True),
+    )
+    assert object_surface(
+        scene(mesh_table(saved(tmp_path, cube()), solid=True)), "it", seed=0
+    ).closed
+
+
+def test_a_mesh_is_not_both_solid_and_hollow(tmp_path: Path) -> None:
+    refused(
+        r"solid = true and hollow = true exclude each other; remove one",
+        mesh_table(saved(tmp_path, cube()), solid=True, hollow=True),
+    )
+
+
 def test_a_mesh_of_too_many_facets_is_refused(tmp_path: Path) -> None:
     file = saved(tmp_path, cube(20.0))
     refused(

@@ -15,18 +15,19 @@ def rough_line(
     normal = np.array([-along[1], along[0]]) / np.hypot(*along)
     heights = rms * np.random.default_rng(seed).standard_normal(facets)
     places = (np.arange(facets) + 0.5) / facets
-    return np.array(start) + places[:, None] * along + heights[:, None] * normal
+    return np.asarray(np.array(start) + places[:, None] * along + heights[:, None] * normal
 
 
 def circle(centre: tuple[float, float], radius: float, facets: int) -> Float[np.ndarray, "n 2"]:
     angles = 2 * np.pi * np.arange(facets) / facets
-    return np.array(centre) + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    points: np.ndarray = np.array(centre) + radius * np.stack([np.cos(angles), np.sin(angles)], -1)
+    return points
 
 
 def random_sources(facets: int, ports: int = 2) -> Complex64[np.ndarray, "3 ports facets"]:
     rng = np.random.default_rng(5)
     parts = rng.standard_normal((2, 3, ports, facets))
-    return (parts[0] + 1j * parts[1]).astype(np.complex64)
+    return np.asarray(parts[0] + 1j * parts[1], dtype=np.complex64)
 
 
 def plain_sum(

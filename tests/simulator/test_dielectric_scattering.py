@@ -195,7 +195,7 @@ def test_a_table_of_permittivity_is_read_for_the_simulation(tmp_path: Any) -> No
         ("chipboard", r"objects\.wall\.material: material 'chipboard': no row .* covers 220-295"),
         (
             {"file": "/none.csv", "thickness_mm": 1.0},
-            r"objects\.wall\.material: /none\.csv: cannot",
+            r"objects\.wall\.material\.file: /none\.csv: cannot",
         ),
         (
             {"permittivity": [2.0, 1e-4], "thickness_mm": 100.0},

@@ -7,8 +7,8 @@ import pytest
 from scenes.library import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.radio_scene import scenario_materials
-from simulator.scenario_paths import mean_mirrors, scenario_paths
-from simulator.sionna_scene import mean_surfaces
+from simulator.mean_surfaces import mean_mirrors, mean_surfaces
+from simulator.scenario_paths import scenario_paths
 
 BASE = {
     "name": "made",

@@ -9,7 +9,8 @@ from scenes.library import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.permittivity import MaterialError
 from simulator.radio_materials import scattering_coefficient
-from simulator.sionna_scene import mean_surfaces, sionna_scene, stand_back
+from simulator.mean_surfaces import mean_surfaces
+from simulator.sionna_scene import sionna_scene, stand_back
 
 
 def solve(scene: rt.Scene, **options: object) -> rt.Paths:

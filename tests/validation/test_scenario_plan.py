@@ -44,3 +44,16 @@ def test_every_object_and_user_is_named_in_the_plan() -> None:
     assert "wall (metal, 0.05 mm rms)" in named
     assert "user" in named
     assert "array" in named
+
+
+def test_antennas_apart_are_named_and_their_beams_drawn() -> None:
+    scenario = load_scenario("rcs_drywall")
+    ax = draw_scenario(Figure().subplots(), scenario)
+    named = [text.get_text() for text in ax.texts]
+    assert "receivers" in named
+    assert "transmitter" in named
+    assert "array" not in named
+    tips = [patch.get_xy()[0] for patch in ax.patches]  # of both wedges
+    places = scenario.base_station.element_positions
+    np.testing.assert_allclose(tips[0], places[len(places) // 2, :2])
+    np.testing.assert_allclose(tips[1], [-0.212132034, 0.087867966])

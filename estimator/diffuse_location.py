@@ -1,0 +1,126 @@
+"""What diffuse scattering off the walls adds to the answer from a user's mirror-like paths."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2
+
+from estimator.diffuse_search import DiffuseFix, SeenWall, search_diffuse
+from estimator.estimate import UserEstimate
+from estimator.measurement import Uplink
+from estimator.mirror_fit import FittedLine
+from estimator.projection import Wall, project
+
+SAME = float(chi2.ppf(0.999, df=2))
+"""Squared distance, over its covariance, within which two positions are the same. [-]."""
+
+
+def with_diffuse_search(
+    answer: UserEstimate,
+    uplink: Uplink,
+    lines: Sequence[FittedLine],
+    walls: Sequence[Wall],
+    seen_through: Sequence[tuple[int, ...]],
+) -> UserEstimate:
+    """Search a user by diffuse scattering where its mirror-like paths do not settle the answer.
+
+    Parameters
+    ----------
+    answer
+        From the paths, in the array's frame.
+    uplink
+        The pilot, with positions in the array's frame and delays on its clock.
+    lines, walls, seen_through
+        The map: walls as the array sees them, where they are, and through which others.
+
+    Returns
+    -------
+    The answer itself, if it is ``found`` or no wall scatters from most of its length. Else
+    ``found`` where the diffuse field says, or at the one place over mirror-like paths that agrees
+    with it, whichever is known better; ``ambiguous`` if the diffuse field, too, comes from
+    several places alike.
+    """
+    if answer.status == "found":
+        return answer
+    seen = [
+        SeenWall(seen=Wall(start=line.start, end=line.end, covariance=line.covariance),
+                 true=wall, through=through)
+        for line, wall, through in zip(lines, walls, seen_through, strict=True)
+    ]  # fmt: skip
+    fix = search_diffuse(uplink, seen)
+    if fix is None:
+        return answer
+    diffuse = _placed(answer, fix, seen)
+    if len(fix.rivals):
+        if answer.status == "ambiguous":
+            return answer
+        return replace(
+            diffuse,
+            status="ambiguous",
+            reason="what the wall scatters is explained as well by other places",
+            alternatives=tuple(_moved(diffuse, rival) for rival in fix.rivals),
+        )
+    agreeing = [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
+    if len(agreeing) == 1 and _spread(agreeing[0]) < _spread(diffuse):
+        return replace(
+            agreeing[0], status="found", reason=None, alternatives=(), paths=answer.paths
+        )
+    return diffuse
+
+
+def _spread(one: UserEstimate) -> float:
+    """Largest standard deviation of a position. [m]."""
+    assert one.covariance is not None
+    return float(np.sqrt(np.linalg.eigvalsh(one.covariance)[-1]))
+
+
+def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) -> UserEstimate:
+    wall = walls[fix.wall]
+    middle = 0.5 * (wall.true.start + wall.true.end)
+    ghost = 0.5 * (wall.seen.start + wall.seen.end)
+    way = project(
+        float(np.arctan2(ghost[1], ghost[0])),
+        float(np.linalg.norm(ghost)),
+        [walls[index].true for index in wall.through],
+        covariance=np.zeros((2, 2)),
+    )
+    return UserEstimate(
+        name=answer.name,
+        status="found",
+        position=fix.position,
+        covariance=fix.covariance + _of_the_wall(fix.position, wall.true),
+        bounces=len(wall.through) + 1,
+        path=np.vstack([way.path[:-1], middle, fix.position]),  # over the middle of the wall
+        line_of_sight=False,
+        paths=answer.paths,
+        method="diffuse",
+    )
+
+
+def _of_the_wall(position: Float[np.ndarray, " 3"], wall: Wall) -> Float[np.ndarray, "3 3"]:
+    """Covariance of a position that is known relative to a wall, from that of the wall."""
+    along = (wall.end - wall.start) / np.linalg.norm(wall.end - wall.start)
+    normal = np.array([along[1], -along[0], 0.0])
+    lever = position - 0.5 * (wall.start + wall.end)
+    turned = np.array([-lever[1], lever[0], 0.0])
+    jacobian = np.stack([turned, normal], axis=-1)
+    covariance: np.ndarray = jacobian @ wall.covariance @ jacobian.T
+    return covariance
+
+
+def _moved(answer: UserEstimate, place: Float[np.ndarray, " 3"]) -> UserEstimate:
+    path = None if answer.path is None else np.vstack([answer.path[:-1], place])
+    return replace(answer, status="ambiguous", position=place, path=path)
+
+
+def _agree(one: UserEstimate, other: UserEstimate) -> bool:
+    """Tell whether two positions are the same within their covariances."""
+    if one.position is None or other.position is None:
+        return False
+    if one.covariance is None or other.covariance is None:
+        return False
+    apart = (one.position - other.position)[:2]
+    spread = (one.covariance + other.covariance)[:2, :2]
+    return bool(apart @ np.linalg.solve(spread, apart) < SAME)

@@ -1,0 +1,147 @@
+"""Chains of mirrors: which ones stand between the array and what its image shows.
+
+In the image a ray from the array is straight. Whatever it shows behind a mirror is seen over it:
+mirroring the rest of the ray about the mirror gives its true way, on which it may meet the
+next one.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from estimator.projection import Wall, mirrored
+
+DEEPEST = 4
+"""Longest chain of mirrors that is unfolded."""
+GRAZING = 1e-9
+"""Least distance from one bounce to the next. [m]."""
+
+Chain = tuple[int, ...]
+"""Indices of mirrors, from the array outward."""
+
+
+def unfolded(
+    points: Float[np.ndarray, "points 3"], walls: Sequence[Wall], *, deepest: int = DEEPEST
+) -> tuple[Float[np.ndarray, "points 3"], Int[np.ndarray, "points deepest"]]:
+    """Put points of the image, as seen by an array at the origin, where they really are.
+
+    Parameters
+    ----------
+    points
+        Places in the raw image. [m]
+    walls
+        All mirrors, at their true place.
+    deepest
+        Most mirrors that are followed.
+
+    Returns
+    -------
+    The true places [m], and for each point the mirrors on its way, from the array outward,
+    filled up with -1.
+    """
+    left = np.linalg.norm(points, axis=-1)
+    heading = points / np.maximum(left, np.finfo(float).tiny)[:, None]
+    place = np.zeros_like(points)
+    chains = np.full((len(points), deepest), -1, dtype=np.int64)
+    going = np.arange(len(points))
+    for bounce in range(deepest):
+        if not (walls and going.size):
+            break
+        before = chains[going, bounce - 1] if bounce else np.full(going.size, -1)
+        distance = np.stack([_crossings(place[going], heading[going], wall) for wall in walls])
+        distance[before[None, :] == np.arange(len(walls))[:, None]] = np.inf
+        first = np.argmin(distance, axis=0)
+        nearest = distance[first, np.arange(going.size)]
+        met = nearest < left[going]
+        going, first, nearest = going[met], first[met], nearest[met]
+        chains[going, bounce] = first
+        place[going] += nearest[:, None] * heading[going]
+        left[going] -= nearest
+        normals = np.stack([_normal(wall) for wall in walls])[first]
+        turn = np.einsum("px,px->p", heading[going], normals)
+        heading[going] -= 2 * turn[:, None] * normals
+    return place + left[:, None] * heading, chains
+
+
+def image_over(
+    points: Float[np.ndarray, "*grid 3"], walls: Sequence[Wall], chain: Chain
+) -> Float[np.ndarray, "*grid 3"]:
+    """Return where the raw image shows true places that are seen over a chain. [m]."""
+    for index in reversed(chain):
+        points = mirrored(points, walls[index].start, walls[index].end)
+    return points
+
+
+def possible_chains(walls: Sequence[Wall], *, deepest: int = DEEPEST) -> Iterator[Chain]:
+    """Go through the chains that some ray from the array could follow; the empty one first.
+
+    A chain is possible if its mirrors' images have a common interval of directions in which
+    each lies behind the one before it somewhere. What stands between is not looked at.
+    """
+    yield from _continued(walls, (), (-np.pi, np.pi), deepest)
+
+
+def _continued(
+    walls: Sequence[Wall], chain: Chain, cone: tuple[float, float], deepest: int
+) -> Iterator[Chain]:
+    yield chain
+    if len(chain) == deepest:
+        return
+    for index, wall in enumerate(walls):
+        if chain and chain[-1] == index:
+            continue
+        image = image_over(np.stack([wall.start, wall.end]), walls, chain)
+        ends = np.arctan2(image[:, 1], image[:, 0])
+        if np.ptp(ends) > np.pi:  # across the negative x axis, behind the array
+            continue
+        narrower = max(cone[0], float(ends.min())), min(cone[1], float(ends.max()))
+        if narrower[0] < narrower[1] and (not chain or _behind(image, walls, chain)):
+            yield from _continued(walls, (*chain, index), narrower, deepest)
+
+
+def _behind(image: Float[np.ndarray, "2 3"], walls: Sequence[Wall], chain: Chain) -> bool:
+    """Tell whether part of a segment of the image lies beyond the image of a chain's last wall."""
+    last = walls[chain[-1]]
+    door = image_over(np.stack([last.start, last.end]), walls, chain[:-1])
+    along = door[1] - door[0]
+    normal = np.array([along[1], -along[0], 0.0])
+    here = float(door[0] @ normal)
+    return bool(np.any((image @ normal - here) * np.sign(here) > 0))
+
+
+def seen_over(
+    images: Float[np.ndarray, "points 3"], walls: Sequence[Wall], chain: Chain
+) -> Bool[np.ndarray, " points"]:
+    """Tell which points of the raw image are seen over exactly this chain of mirrors."""
+    seen = np.ones(len(images), dtype=bool)
+    if chain:  # most points are outside the first mirror: they need not be followed
+        first = walls[chain[0]]
+        heading = images / np.maximum(np.linalg.norm(images, axis=-1), 1e-300)[:, None]
+        reach = _crossings(np.zeros_like(images), heading, first)
+        seen = reach < np.linalg.norm(images, axis=-1)
+    deepest = min(len(chain) + 1, DEEPEST)
+    met = unfolded(images[seen], walls, deepest=deepest)[1]
+    wanted = np.full(deepest, -1)
+    wanted[: len(chain)] = chain
+    seen[seen] = np.all(met == wanted, axis=1)
+    return seen
+
+
+def _normal(wall: Wall) -> Float[np.ndarray, " 3"]:
+    along = (wall.end - wall.start) / np.linalg.norm(wall.end - wall.start)
+    return np.array([along[1], -along[0], 0.0])
+
+
+def _crossings(
+    origins: Float[np.ndarray, "rays 3"], headings: Float[np.ndarray, "rays 3"], wall: Wall
+) -> Float[np.ndarray, " rays"]:
+    """Return the distance at which each ray meets a wall; infinity if it does not. [m]."""
+    normal, along = _normal(wall), wall.end - wall.start
+    towards = headings @ normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (wall.start - origins) @ normal / towards
+        meets = origins + distance[:, None] * headings - wall.start
+        share = meets @ along / (along @ along)
+    hit = (distance > GRAZING) & (share >= 0) & (share <= 1)
+    return np.where(hit, distance, np.inf)

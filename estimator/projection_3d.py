@@ -1,0 +1,187 @@
+"""Projection in space: launch a ray and fold it at each plane mirror that it meets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+MOST_BOUNCES = 8
+GRAZING = 1e-9
+"""Least distance from one bounce to the next. [m]."""
+STEP = 1e-6
+"""Step of the numerical derivatives: in metres, cosines and slopes alike."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaneWall:
+    """A flat mirror in space: a convex polygon, with what is known of its plane."""
+
+    corners: Float[np.ndarray, "corners 3"]  # in order around it, in its plane [m]
+    centre: Float[np.ndarray, " 3"]  # where the covariance is counted from [m]
+    axes: Float[np.ndarray, "2 3"]  # unit vectors in the plane
+    covariance: Float[np.ndarray, "3 3"]  # of (tilt along each axis [rad], offset [m])
+
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """Unit vector across, the first axis cross the second."""
+        return np.cross(self.axes[0], self.axes[1])
+
+    def moved(self, change: Float[np.ndarray, " 3"]) -> "PlaneWall":
+        """Tilt the plane about its centre, so that it rises by a slope, and offset it."""
+        normal = self.normal
+        rise = (self.corners - self.centre) @ (self.axes.T @ change[:2]) + change[2]
+        tilted = self.axes + change[:2, None] * normal
+        first = tilted[0] / np.linalg.norm(tilted[0])
+        second = tilted[1] - (tilted[1] @ first) * first
+        return PlaneWall(
+            corners=self.corners + rise[:, None] * normal,
+            centre=self.centre + change[2] * normal,
+            axes=np.stack([first, second / np.linalg.norm(second)]),
+            covariance=self.covariance,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpaceProjection:
+    """Where a path of known direction and length ends."""
+
+    position: Float[np.ndarray, " 3"]  # [m]
+    covariance: Float[np.ndarray, "3 3"]  # [m²]
+    walls: tuple[int, ...]  # met on the way, from the array outward
+    path: Float[np.ndarray, "vertices 3"]  # array, bounces, user [m]
+
+
+def mirrored_about(points: Float[np.ndarray, "*n 3"], wall: PlaneWall) -> Float[np.ndarray, "*n 3"]:
+    """Mirror points about a wall's plane. [m]."""
+    normal = wall.normal
+    height = np.einsum("...x,x->...", points - wall.centre, normal)
+    images: np.ndarray = points - 2 * height[..., None] * normal
+    return images
+
+
+def within(
+    points: Float[np.ndarray, "n 3"], wall: PlaneWall, *, margin: float = 0.0
+) -> Bool[np.ndarray, " n"]:
+    """Tell which points of a wall's plane lie in its polygon, widened by a margin [m]."""
+    corners = (wall.corners - wall.centre) @ wall.axes.T
+    places = (points - wall.centre) @ wall.axes.T
+    edges = np.roll(corners, -1, axis=0) - corners
+    turn = np.sign(
+        np.sum(
+            corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)
+        )
+    )
+    inward = turn * np.stack([-edges[:, 1], edges[:, 0]], axis=-1)
+    inward = inward / np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-12)
+    depth = np.einsum("nex,ex->ne", places[:, None, :] - corners, inward)
+    inside: np.ndarray = np.all(depth >= -margin, axis=1)
+    return inside
+
+
+def hidden_by(
+    points: Float[np.ndarray, "n 3"], wall: PlaneWall, *, margin: float = 0.0
+) -> Bool[np.ndarray, " n"]:
+    """Tell which points the array, at the origin, sees through a wall."""
+    normal = wall.normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (wall.centre @ normal) / (points @ normal)
+    crossed = (share > 0) & (share < 1)
+    hidden = np.zeros(len(points), dtype=bool)
+    hidden[crossed] = within(share[crossed, None] * points[crossed], wall, margin=margin)
+    return hidden
+
+
+def project_in_space(
+    cosines: tuple[float, float],
+    path_length: float,
+    walls: Sequence[PlaneWall],
+    *,
+    covariance: Float[np.ndarray, "3 3"],
+    margin: float = 0.0,
+) -> SpaceProjection:
+    """Follow a path from the array, at the origin, to its end.
+
+    Parameters
+    ----------
+    cosines
+        Of the direction, along x and z. [-]
+    path_length
+        Length of the whole path. [m]
+    walls
+        All mirrors, at their true place.
+    covariance
+        Of (cosine along x, cosine along z, path length).
+    margin
+        By how much each wall is taken to be wider than it was seen. [m]
+
+    Returns
+    -------
+    The end, with the covariance that the path's and the walls' imply to first order.
+    """
+    path, met = _trace(cosines, path_length, walls, margin)
+    parameters = np.array([*cosines, path_length])
+    by_path = np.stack(
+        [
+            (_end(parameters + step, walls, met) - _end(parameters - step, walls, met)) / (2 * STEP)
+            for step in np.eye(3) * STEP
+        ],
+        axis=-1,
+    )
+    total = by_path @ covariance @ by_path.T
+    for index in set(met):
+        ends = []
+        for step in np.eye(3) * STEP:
+            for sign in (1.0, -1.0):
+                shifted = list(walls)
+                shifted[index] = walls[index].moved(sign * step)
+                ends.append(_end(parameters, shifted, met))
+        by_wall = np.stack([ends[0] - ends[1], ends[2] - ends[3], ends[4] - ends[5]], axis=-1)
+        by_wall = by_wall / (2 * STEP)
+        total = total + by_wall @ walls[index].covariance @ by_wall.T
+    return SpaceProjection(position=path[-1], covariance=total, walls=tuple(met), path=path)
+
+
+def _towards(cosines: Float[np.ndarray, " 2"]) -> Float[np.ndarray, " 3"]:
+    ahead = np.sqrt(max(1 - float(cosines @ cosines), 0.0))
+    return np.array([cosines[0], ahead, cosines[1]])
+
+
+def _trace(
+    cosines: tuple[float, float], path_length: float, walls: Sequence[PlaneWall], margin: float
+) -> tuple[Float[np.ndarray, "vertices 3"], list[int]]:
+    place, direction = np.zeros(3), _towards(np.array(cosines))
+    left = path_length
+    vertices, met = [place], list[int]()
+    while len(met) < MOST_BOUNCES:
+        hits = []
+        for index, wall in enumerate(walls):
+            slope = float(direction @ wall.normal)
+            if (met and met[-1] == index) or abs(slope) < 1e-12:
+                continue
+            distance = float((wall.centre - place) @ wall.normal) / slope
+            if not GRAZING < distance < left:
+                continue
+            if within((place + distance * direction)[None], wall, margin=margin)[0]:
+                hits.append((distance, index))
+        if not hits:
+            break
+        distance, index = min(hits)
+        place = place + distance * direction
+        normal = walls[index].normal
+        direction = direction - 2 * (direction @ normal) * normal
+        left -= distance
+        vertices.append(place)
+        met.append(index)
+    vertices.append(place + left * direction)
+    return np.stack(vertices), met
+
+
+def _end(
+    parameters: Float[np.ndarray, " 3"], walls: Sequence[PlaneWall], chain: Sequence[int]
+) -> Float[np.ndarray, " 3"]:
+    """End of the path over a given chain of mirrors, whatever their extent."""
+    end = parameters[2] * _towards(parameters[:2])
+    for index in chain:  # the images of later walls, as the array sees them, fold back in turn
+        end = mirrored_about(end, walls[index])
+    return np.asarray(end)

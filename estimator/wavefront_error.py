@@ -1,0 +1,113 @@
+r"""How far a measured wavefront departs from a sphere, from what the fit leaves over.
+
+Noise is white. What a rough mirror adds is not: a patch of it beside the specular point sends
+its part at another angle, hence as a fringe of some period over the aperture, and later by an
+excess that grows with the square of that angle. Over the aperture and the band it fills modes
+(p, q) along a parabola q ∝ p²; summed over q it is nearly the same in all of them, as the
+roughness' spectrum is flat up to one over its correlation length. So the modes that the fit
+leaves over tell the level in those that it takes for the wave's own: in the mean over
+the band (q = 0) p = 3 … 8 tell that of a tilt (p = 1), in the first mode over the band (q = 1)
+p = 1 … 3 that of a delay (p = 0).
+
+Within a Fresnel zone of the specular point a patch bends the phase only; farther out half of it
+goes into the amplitude. The sum of both is therefore what a slow error of the phase has.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.fft import dct
+from scipy.stats import chi2, f
+
+TILTS = (3, 8)
+"""Modes over the aperture, in half periods, that tell the level of a tilt. Lower ones belong to
+the wave itself (gain, angle, curvature) and to the antenna's beam; far higher ones come from
+patches so late or so far off that the fit does not see them."""
+DELAYS = (1, 3)
+"""Modes over the aperture that tell, in the first mode over the band, the level of a delay."""
+
+MANY = 40
+"""Last mode that tells whether there is anything beside noise at all."""
+SIGNIFICANT = 0.99
+"""Probability that modes of noise alone stay below what counts as more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WavefrontError:
+    """Variance of a wave's phase on top of the noise, independent from element to element."""
+
+    mean: float  # common to all frequencies [rad²]
+    slope: float  # along half a cosine over the band, of mean square 1 [rad²]
+
+
+def noise_variance(samples: Complex[np.ndarray, "elements freqs"]) -> float:
+    """Estimate the noise in each sample from the delays at which nothing arrives.
+
+    The median over all delays is blind to the few that hold signal; a Hann window keeps the
+    signal's sidelobes out of the others.
+    """
+    window = np.hanning(samples.shape[1] + 2)[1:-1]
+    delays = np.abs(np.fft.fft(samples * window, axis=1)) ** 2
+    return float(np.median(delays)) / float(np.log(2)) / float(np.sum(window**2))
+
+
+def wavefront_error(
+    left: Complex[np.ndarray, "elements freqs"],
+    wave: Complex[np.ndarray, "elements freqs"],
+    noise: float,
+) -> WavefrontError:
+    """Estimate the error of a fitted wave's phase from what the fit leaves over.
+
+    Parameters
+    ----------
+    left
+        The pilot less all fitted waves. [-]
+    wave
+        One of these, as it was fitted. [-]
+    noise
+        Variance of each sample. [-]
+
+    Returns
+    -------
+    Its variances; 0 where noise alone explains what is left.
+    """
+    count = wave.shape[1]
+    size = np.abs(wave)
+    level = float(np.sqrt(np.mean(size**2)))
+    turned = left * np.conj(wave) / (np.maximum(size, 1e-12 * level) * level)
+    falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    bands = np.stack([turned.mean(axis=1), (turned * falling).mean(axis=1)])
+    # Antennas' gain and the wave's spreading vary over the band by a factor that all elements
+    # share: it is no bend of the wavefront, though the wave itself is stronger on near ones.
+    shape = size[:, 0] / np.linalg.norm(size[:, 0])
+    bands = bands - np.outer(bands @ shape, shape)
+    modes = np.abs(dct(bands.real, norm="ortho", axis=1)) ** 2
+    modes += np.abs(dct(bands.imag, norm="ortho", axis=1)) ** 2
+    white = noise / level**2 / count
+    tilts, delays = (
+        _excess(row, first, last, white)
+        for row, (first, last) in zip(modes, (TILTS, DELAYS), strict=True)
+    )
+    return WavefrontError(mean=tilts, slope=delays)
+
+
+def _excess(modes: Float[np.ndarray, " elements"], first: int, last: int, white: float) -> float:
+    """Return the level of some modes over that of noise.
+
+    Where the few do not stand out of noise, many tell better that there is nothing, or little.
+    """
+    first = min(first, modes.size - 1)
+    few = modes[first : last + 1]
+    if few.mean() > white * chi2.ppf(SIGNIFICANT, 2 * few.size) / (2 * few.size):
+        return _widening((first, last)) * (float(few.mean()) - white)
+    return max(float(modes[first : MANY + 1].mean()) - white, 0.0)
+
+
+def _widening(modes: tuple[int, int]) -> float:
+    """Widen a variance known from few modes, so that a 95 % region in two dimensions is one.
+
+    Its square is F-distributed then, with two degrees of freedom for each mode, not χ².
+    """
+    freedom = 2 * (modes[1] - modes[0] + 1)
+    return float(2 * f.ppf(0.95, 2, freedom) / chi2.ppf(0.95, 2))

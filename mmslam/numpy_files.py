@@ -1,0 +1,91 @@
+"""Arrays from NumPy's own files; a pickled object in one is never loaded."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from estimator.measurement import MeasurementError
+
+LARGEST = 2**28
+"""Most values of all arrays that are read, unless told otherwise."""
+
+_WIDEST = 16  # bytes of a complex number
+
+
+def npz_arrays(
+    path: Path, *, only: str | None = None, largest: int = LARGEST
+) -> dict[str, np.ndarray]:
+    """Read the arrays of an .npz archive, or the one of them that is asked for.
+
+    Parameters
+    ----------
+    path
+        The archive.
+    only
+        The one array that is read; None: all.
+    largest
+        The most values that are read.
+
+    Raises
+    ------
+    MeasurementError
+        If it is no archive, is damaged, or holds pickled objects.
+    """
+    if not path.is_file():
+        raise MeasurementError(f"{path}: no such file")
+    if not zipfile.is_zipfile(path):
+        raise MeasurementError(
+            f"{path}: not a NumPy .npz archive; write one with numpy.savez_compressed"
+        )
+    arrays = {}
+    try:
+        with zipfile.ZipFile(path) as packed:
+            promised = sum(
+                entry.file_size
+                for entry in packed.infolist()
+                if only is None or entry.filename == f"{only}.npy"
+            )
+        if promised > _WIDEST * largest:
+            raise MeasurementError(
+                f"{path}: {promised} bytes unpacked, more than {_WIDEST * largest}: thin it out, "
+                "or import in parts"
+            )
+        with np.load(path, allow_pickle=False) as archive:
+            for name in archive.files:
+                if only is None or name == only:
+                    arrays[name] = archive[name]
+            if only is not None and only not in arrays:
+                found = ", ".join(sorted(archive.files)) or "nothing"
+                raise MeasurementError(f"{path}: no array {only!r} (found: {found}); choose one")
+    except MeasurementError:
+        raise
+    except Exception as error:  # zip, codecs and NumPy fail in many ways on a damaged file
+        raise _pickled_or_damaged(path, error) from error
+    return arrays
+
+
+def npy_array(path: Path) -> np.ndarray:
+    """Read the array of an .npy file.
+
+    Raises
+    ------
+    MeasurementError
+        If it is none, is damaged, or holds pickled objects.
+    """
+    try:
+        with path.open("rb") as stream:
+            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+    except Exception as error:  # NumPy fails in many ways on a damaged header
+        raise _pickled_or_damaged(path, error) from error
+
+
+def _pickled_or_damaged(path: Path, error: Exception) -> MeasurementError:
+    if "pickle" in str(error):  # what NumPy says of an array of objects
+        return MeasurementError(
+            f"{path}: {error}; pickled objects are never loaded, store plain arrays of numbers "
+            "instead"
+        )
+    return MeasurementError(
+        f"{path}: cannot be read ({error}); it may be truncated or of another kind: copy it again"
+    )

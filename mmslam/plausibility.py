@@ -1,0 +1,152 @@
+"""Is a measurement of a size that can be? Wrong units are the commonest mistake, and silent."""
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.spatial import cKDTree
+
+from estimator.measurement import MeasurementError
+
+LOWEST, HIGHEST = 1e9, 1e13
+"""Frequencies of radios that measure rooms to millimetres: 220 in GHz, taken for Hz, lies far
+below; 220e9 in Hz, taken for GHz, far above. [Hz]"""
+
+WIDEST = 20.0
+"""Largest aperture: 130 mm taken for metres lie far above. [m]"""
+
+SPARSEST = 20.0
+"""Largest median distance of neighbours, in wavelengths: 0.5 mm taken for metres is 400."""
+
+STRONGEST = 1.0
+"""Largest magnitude that a passive link can have, an S-parameter. [-]"""
+
+
+LARGEST_SAMPLE = 1e6
+"""Largest magnitude that is read: 120 dB above a passive link, or a damaged number. [-]"""
+
+FARTHEST = 1000.0
+"""Largest coordinate; beyond, phases at 1 THz lose 1e-6 rad in double precision. [m]"""
+
+
+def check_samples(name: str, samples: Complex[np.ndarray, "positions freqs"]) -> None:
+    """Refuse samples that no receiver gives.
+
+    Raises
+    ------
+    MeasurementError
+        If one is above :data:`LARGEST_SAMPLE` or not finite.
+    """
+    largest = max(float(np.abs(samples.real).max()), float(np.abs(samples.imag).max()))
+    if not largest <= LARGEST_SAMPLE:
+        raise MeasurementError(
+            f"{name}: samples reach {largest:.3g}; an S-parameter is at most {LARGEST_SAMPLE:.0e}: "
+            "the file may be damaged, or the mapping names another variable"
+        )
+
+
+def check_frequencies(name: str, frequencies: Float[np.ndarray, " freqs"], remedy: str) -> None:
+    """Refuse frequencies at which no such radio works.
+
+    Raises
+    ------
+    MeasurementError
+        If one is outside :data:`LOWEST` … :data:`HIGHEST`.
+    """
+    low, high = float(frequencies.min()), float(frequencies.max())
+    if not LOWEST <= low <= high <= HIGHEST:
+        raise MeasurementError(
+            f"{name}: frequencies {low:.6g} … {high:.6g} Hz; they must be {LOWEST:.0e} … "
+            f"{HIGHEST:.0e} Hz: {remedy}"
+        )
+
+
+def check_positions(
+    name: str,
+    positions: Float[np.ndarray, "positions 3"],
+    shortest_wave: float,
+    *,
+    any_size: bool,
+    remedy: str,
+) -> None:
+    """Refuse an array larger, sparser or smaller than any that could be imaged with.
+
+    Parameters
+    ----------
+    name
+        What the positions belong to, for the message.
+    positions
+        Where the antenna stood. [m]
+    shortest_wave
+        Shortest wavelength. [m]
+    any_size
+        Accept any extent and spacing.
+    remedy
+        Which key to change, for the message.
+
+    Raises
+    ------
+    MeasurementError
+        If a coordinate is above :data:`FARTHEST`, the extent above :data:`WIDEST` or below a
+        wavelength, or neighbours are further apart than :data:`SPARSEST` wavelengths.
+    """
+    farthest = float(np.abs(positions).max())
+    if farthest > FARTHEST:
+        raise MeasurementError(
+            f"{name}: a coordinate of {farthest:.4g} m; it must be at most {FARTHEST:g} m: set the "
+            "unit and the origin of [positions] right"
+        )
+    if len(positions) < 2 or any_size:
+        return
+    extent = float(np.ptp(positions, axis=0).max())
+    # The first neighbour of a point is the point itself.
+    distances = np.asarray(cKDTree(positions).query(positions, k=2)[0])
+    apart = float(np.median(distances[:, 1]))
+    if extent > WIDEST:
+        reason = f"an array of {extent:.4g} m; it must be at most {WIDEST:g} m"
+    elif extent < shortest_wave:
+        reason = (
+            f"an array of {1e3 * extent:.4g} mm is smaller than the wavelength "
+            f"({1e3 * shortest_wave:.4g} mm) and tells no angle"
+        )
+    elif apart > SPARSEST * shortest_wave:
+        reason = (
+            f"positions {1e3 * apart:.4g} mm apart, {apart / shortest_wave:.0f} wavelengths; "
+            f"they must be at most {SPARSEST:g} wavelengths apart"
+        )
+    else:
+        return
+    raise MeasurementError(f"{name}: {reason}: {remedy}")
+
+
+def strength_note(name: str, samples: Complex[np.ndarray, "positions freqs"]) -> str | None:
+    """Remark that samples are stronger than a passive link's."""
+    strongest = float(np.abs(samples).max())
+    if strongest <= STRONGEST:
+        return None
+    return (
+        f"{name}: samples reach |S| = {strongest:.4g}; a passive link stays below 1: are they in "
+        "decibels, or amplified?"
+    )
+
+
+def sign_note(
+    name: str,
+    samples: Complex[np.ndarray, "positions freqs"],
+    frequencies: Float[np.ndarray, " freqs"],
+) -> str | None:
+    r"""Remark that the delays look negative: the other time convention may be meant.
+
+    On a grid of step Δf, delays are told modulo 1/Δf; negative ones fill the upper half of it.
+    What a room sends back comes in the lower half, where its reach is less than c/2Δf of path.
+    """
+    power = (np.abs(np.fft.ifft(samples, axis=1)) ** 2).sum(axis=0)
+    half = len(power) // 2
+    # The first and the middle cells belong to neither half: a leak of the antennas is there.
+    early, late = power[1:half].sum(), power[half + 1 :].sum()
+    if len(power) < 8 or late <= 2 * early:  # twice: noise alone fills both alike
+        return None
+    reach = speed_of_light / float(frequencies[1] - frequencies[0])
+    return (
+        f"{name}: most of the power comes after half of the unambiguous path of {reach:.4g} m; "
+        "if the path is shorter than that half, set time_convention to the other sign"
+    )

@@ -1,0 +1,95 @@
+"""What cannot be is refused in under a second of the whole command, with what to do about it."""
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import trimesh
+
+LIMIT = 1.0
+"""Of the processor, from the start of Python to its end. The wall's clock would also measure
+what else the machine does. [s]"""
+
+POST = {"objects.post.kind": "cylinder", "objects.post.material": "metal"}
+BOX = {
+    "objects.box.kind": "box", "objects.box.material": "metal", "objects.box.centre_m": "[1, 2]",
+    "objects.box.length_m": "0.2", "objects.box.depth_m": "0.2",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("scenario", "overrides", "message"),
+    [
+        (
+            "slam_2d",
+            {**POST, **BOX, "objects.post.centre_m": "[1, 2.05]", "objects.post.radius_m": "0.1"},
+            "overlaps objects.post; solids may touch (to 1 µm), not overlap; move or shrink",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.scale": "0.05", "objects.sphere.centre_m": "[0, 0.38, 0]"},
+            "objects.sphere.centre_m = [0.0, 0.38]: the solid overlaps objects.letter; solids",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.scale": "1.0", "objects.sphere.centre_m": "[0, 30, 0]"},
+            "objects.sphere: needs 7.78e+08 facets at a spacing of 0.254 mm, all objects 92.7 GiB, "
+            "more than 16 GiB; make it smaller, lower radio.stop_ghz, or raise",
+        ),
+        (
+            "slam_2d",
+            {"objects.wall.length_m": "1000", "objects.wall.roughness.correlation_mm": "1e-4"},
+            "more than 16 GiB; make it smaller",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.material": "drywal"},
+            "objects.sphere.material = 'drywal': unknown material (did you mean 'drywall'?); use",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.file": "none.ply"},
+            "No such file or directory; give the path of a mesh, relative to the scenario's file",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.file": "FOLDER/empty.ply"},
+            "a file of 1 byte to 2 GiB is needed, this has 0 bytes; export the mesh again",
+        ),
+        (
+            "bench_3d",
+            {"objects.sphere.file": "FOLDER/open.ply", "objects.sphere.solid": "true"},
+            "of its edges do not belong to exactly two triangles, and solid = true needs a "
+            "watertight mesh; close its holes and export it again, or set solid = false",
+        ),
+        (
+            "slam_2d",
+            {"objects.wall.material": '{file = "FOLDER/table.csv", thickness_mm = 5}'},
+            "table.csv: 0.5 - 0j is no permittivity of a passive dielectric; the real part must",
+        ),
+    ],
+    ids=[
+        "overlap", "overlapping meshes", "mesh facets", "facets", "material", "missing", "empty",
+        "open", "table",
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_in_under_a_second(
+    scenario: str, overrides: dict[str, str], message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "empty.ply").touch()
+    (tmp_path / "table.csv").write_text("frequency_ghz,eps_real,eps_imag\n220,0.5,0\n330,2,0\n")
+    sphere = trimesh.creation.icosphere(subdivisions=4)
+    sphere.update_faces([*range(0, len(sphere.faces), 2)])
+    sphere.export(tmp_path / "open.ply")
+    command = [sys.executable, "-m", "mmslam", "simulate", scenario, "-o", "none.zarr"]
+    for key, value in overrides.items():
+        command += ["--set", f"{key}={value.replace('FOLDER', str(tmp_path))}"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in " ".join(done.stderr.split())
+    assert not Path("none.zarr").exists()
+    assert (after.ru_utime - before.ru_utime) + (after.ru_stime - before.ru_stime) < LIMIT
