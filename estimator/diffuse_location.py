@@ -13,6 +13,9 @@ from estimator.measurement import Uplink
 from estimator.mirror_fit import FittedLine
 from estimator.projection import Wall, project
 
+MOST_ENERGY = 0.5
+"""Share of the pilot's energy from which paths are not given up for what a wall scatters. [-]"""
+
 SAME = float(chi2.ppf(0.999, df=2))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
 
@@ -37,12 +40,12 @@ def with_diffuse_search(
 
     Returns
     -------
-    The answer itself, if it is ``found`` or no wall scatters from most of its length. Else
-    ``found`` where the diffuse field says, or at the one place over mirror-like paths that agrees
-    with it, whichever is known better; ``ambiguous`` if the diffuse field, too, comes from
-    several places alike.
+    The answer itself, if no wall scatters from most of its length, or if it is ``found`` and the
+    diffuse field agrees. Else ``found`` where the diffuse field says, or at the one place over
+    mirror-like paths that agrees with it, whichever is known better; ``ambiguous`` if the diffuse
+    field, too, comes from several places alike, or contradicts paths with most of the energy.
     """
-    if answer.status == "found":
+    if _settled(answer):
         return answer
     seen = [
         SeenWall(seen=Wall(start=line.start, end=line.end, covariance=line.covariance),
@@ -53,6 +56,15 @@ def with_diffuse_search(
     if fix is None:
         return answer
     diffuse = _placed(answer, fix, seen)
+    if answer.status == "found" and (len(fix.rivals) or _agree(answer, diffuse)):
+        return answer
+    if answer.status == "found" and _share(answer) > MOST_ENERGY:
+        return replace(
+            answer,
+            status="ambiguous",
+            reason="what the wall scatters comes from elsewhere than the path does",
+            alternatives=(replace(diffuse, status="ambiguous"),),
+        )
     if len(fix.rivals):
         if answer.status == "ambiguous":
             return answer
@@ -68,6 +80,16 @@ def with_diffuse_search(
             agreeing[0], status="found", reason=None, alternatives=(), paths=answer.paths
         )
     return diffuse
+
+
+def _settled(answer: UserEstimate) -> bool:
+    """Tell whether several paths agree already: what a wall scatters is not needed then."""
+    return answer.status == "found" and sum(path.used for path in answer.paths) > 1
+
+
+def _share(answer: UserEstimate) -> float:
+    """Energy of the paths that an answer rests on, over the pilot's. [-]."""
+    return sum(path.share for path in answer.paths if path.used)
 
 
 def _spread(one: UserEstimate) -> float:
@@ -94,7 +116,12 @@ def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) ->
         bounces=len(wall.through) + 1,
         path=np.vstack([way.path[:-1], middle, fix.position]),  # over the middle of the wall
         line_of_sight=False,
-        paths=answer.paths,
+        paths=tuple(
+            replace(path, used=False, reason="what the wall scatters comes from elsewhere")
+            if path.used
+            else path
+            for path in answer.paths
+        ),
         method="diffuse",
     )
 

@@ -29,6 +29,8 @@ LEAST_SHARE = 0.05
 """Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
 FALSE_ALARM = 1e-6
 """Probability that noise alone gives a wave somewhere in the map. [-]"""
+UNRESOLVED = 0.5
+"""Cells λ/D and c/B apart below which two waves are one. [-]"""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the covariance is an estimate from few
 modes itself, and a rough mirror bends the wavefront in ways it only samples."""
@@ -112,7 +114,10 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
                 break  # speckle
             # Each with its own curvature, whatever it is: less of the waves is left behind.
             together = [*before, *_starts(alone.waves)]
-            found = fit_spherical_waves(uplink, together) if before else alone
+            joint = fit_spherical_waves(uplink, together) if before else alone
+            if _unresolved(uplink, joint.waves):
+                break  # a rough wall bent one wave's front; two would describe it, and cancel
+            found = joint
         except ValueError:
             break  # no maximum near the peak: a ridge, not a wave; or no second wave
         left = replace(left, samples=found.left)
@@ -147,6 +152,15 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
         except ValueError:
             pass  # the summit with the delay's curvature lies elsewhere: keep the free one
     return PathSet(paths=paths, covariance=covariance, free_covariance=free_covariance)
+
+
+def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
+    """Tell whether two waves are within :data:`UNRESOLVED` cells, in angle and in length."""
+    beam = speed_of_light / float(uplink.frequencies.mean()) / float(np.ptp(uplink.positions[:, 0]))
+    cell = speed_of_light / float(np.ptp(uplink.frequencies))
+    places = np.array([[np.cos(wave.aoa) / beam, wave.path_length / cell] for wave in waves])
+    apart = np.abs(places[:, None] - places).max(axis=-1)
+    return bool((apart[np.triu_indices(len(waves), k=1)] < UNRESOLVED).any())
 
 
 def _refined(uplink: Uplink, aoa: float, path_length: float) -> WaveStart:

@@ -203,39 +203,45 @@ def _over_mirrors_alone(
         peak = send.pattern.peak * receive.pattern.peak
         if gains.max(initial=0.0) < LEVEL * peak:
             continue
-        for index in np.flatnonzero(gains >= LEVEL * peak).tolist():
-            one = slice(index, index + 1)
-            weight = _share(scene, mirrors, leg, send.positions[one], receive.positions[one])
-            if weight > 0.0:
-                places = image.positions[one], receive.positions[one]
-                chain = unfolded_chain(mirrors, leg.sequence, *places)
-                field = reflected_field(mirrors, chain, frequencies)
-                wave = direct_wave(chain.lengths, frequencies, waves="spherical")
-                echo[index] += weight * gains[index] * (field * wave)[0]
+        some = np.flatnonzero(gains >= LEVEL * peak)
+        shares = _shares(scene, mirrors, leg, send.positions[some], receive.positions[some])
+        some, shares = some[shares > 0.0], shares[shares > 0.0]
+        if some.size == 0:
+            continue
+        chain = unfolded_chain(
+            mirrors, leg.sequence, image.positions[some], receive.positions[some], paired=True
+        )
+        field = reflected_field(mirrors, chain, frequencies)
+        wave = direct_wave(lengths[some], frequencies, waves="spherical")
+        echo[some] += (shares * gains[some])[:, None] * field * wave
     return echo
 
 
-def _share(
+def _shares(
     scene: RadioScene,
     mirrors: Mirrors,
     leg: Leg,
-    source: Float[np.ndarray, "1 3"],
-    receiver: Float[np.ndarray, "1 3"],
-) -> float:
-    """Tell whether a path leads over a leg, 0 or 1; where it just does so, one half.
+    sources: Float[np.ndarray, "links 3"],
+    receivers: Float[np.ndarray, "links 3"],
+) -> Float[np.ndarray, " links"]:
+    """Tell which paths a leg has, 0 or 1; where it just has one, one half.
 
     Between two walls at right angles the way back to the antenna meets their very edge. Both
     orders of the walls then count half, as physical optics has it: half of the Fresnel zone lies
     on either wall.
     """
     found = [
-        trace_chain(
-            mirrors,
-            leg.sequence,
-            source,
-            receiver + side * NUDGE,
-            blocked=partial(blocked, scene.rays),
-        ).lengths.size
+        np.diagonal(
+            trace_chain(
+                mirrors,
+                leg.sequence,
+                sources,
+                receivers + side * NUDGE,
+                blocked=partial(blocked, scene.rays),
+                paired=True,
+            ).valid
+        )
         for side in (1.0, -1.0)
     ]
-    return sum(found) / 2
+    shares: np.ndarray = np.mean(found, axis=0)
+    return shares

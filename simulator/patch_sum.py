@@ -27,14 +27,14 @@ COEFFICIENT_ACCURACY = 1e-4
 FACETS_AT_ONCE = 2_000_000
 """Triangles whose visibility is looked at in one go. [-]"""
 
-TABLE_AT_ONCE = 2**29
-"""Triangles times links whose visibility may have to be kept: 512 MiB. [-]"""
+TABLE_AT_ONCE = 2**28
+"""Triangles times links whose visibility may have to be kept: 256 MiB. [-]"""
 
 LANES_AT_ONCE = 1_000_000
 """Patches times links in one kernel: 200 MB of sums. [-]"""
 
-MASKED_AT_ONCE = 2**28
-"""Triangles times links of which some are seen: 256 MiB. [-]"""
+MASKED_AT_ONCE = 2**27
+"""Triangles times links of which some are seen: 128 MiB. [-]"""
 
 LINKS_AT_ONCE = 32
 """Links that are interpolated by one matrix product, on one thread. [-]"""

@@ -13,7 +13,7 @@ from simulator.mirrors import Mirrors
 from simulator.reach import Sight
 from simulator.specular_legs import Leg, legs_within_reach
 
-LARGEST_TARGET = 1.0
+LARGEST_TARGET = 0.5
 """Longest side of a body that is cut into facets where it is seen over mirrors; larger ones are
 mirrors themselves. [m]"""
 

@@ -110,14 +110,25 @@ def trace_chain(
     *,
     blocked: Blocked,
     receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
+    paired: bool = False,
 ) -> Chain:
-    """Find the specular paths over one given sequence of mirrors; see :func:`find_chains`."""
+    """Find the specular paths over one given sequence of mirrors; see :func:`find_chains`.
+
+    Parameters
+    ----------
+    mirrors, sources, receivers, blocked, receiver_offsets
+        See :func:`find_chains`.
+    sequence
+        The mirrors, from the source onward.
+    paired
+        Each source is linked with the receiver of the same index only.
+    """
     images = np.empty((len(sequence), *sources.shape))
     latest = sources
     for bounce, mirror in enumerate(sequence):
         images[bounce] = latest = mirrors.images(latest, mirror)
     ends = receivers if receiver_offsets is None else receivers + receiver_offsets
-    return _trace(mirrors, sequence, images, sources, receivers, ends, blocked)
+    return _trace(mirrors, sequence, images, sources, receivers, ends, blocked, paired=paired)
 
 
 def unfolded_chain(
@@ -125,6 +136,8 @@ def unfolded_chain(
     sequence: tuple[int, ...],
     images: Float[np.ndarray, "sources 3"],
     receivers: Float[np.ndarray, "receivers 3"],
+    *,
+    paired: bool = False,
 ) -> Chain:
     """Lay paths over a sequence of mirrors as if those were endless and nothing in the way.
 
@@ -136,13 +149,17 @@ def unfolded_chain(
         Images of the sources behind the last of them. [m]
     receivers
         Every image is linked with every receiver. [m]
+    paired
+        Each image is linked with the receiver of the same index only.
     """
-    unfolded = (receivers - images[:, None]).reshape(-1, 3)
+    unfolded = receivers - images if paired else (receivers - images[:, None]).reshape(-1, 3)
     lengths = np.sqrt(dot(unfolded, unfolded))
     directions, cosines = _folded_back(mirrors, sequence, unfolded / lengths[:, None])
     return Chain(
         mirrors=sequence,
-        valid=np.ones((len(images), len(receivers)), dtype=bool),
+        valid=np.eye(len(images), dtype=bool)
+        if paired
+        else np.ones((len(images), len(receivers)), dtype=bool),
         lengths=lengths,
         vertices=np.full((len(lengths), len(sequence), 3), np.nan),
         cosines=cosines,
@@ -220,19 +237,21 @@ def _trace(
     receivers: Float[np.ndarray, "receivers 3"],
     ends: Float[np.ndarray, "receivers 3"],
     blocked: Blocked,
+    *,
+    paired: bool = False,
 ) -> Chain:
-    pairs = np.zeros(len(sources) * len(receivers), dtype=bool)
+    pairs = np.zeros(len(sources) * (1 if paired else len(receivers)), dtype=bool)
     parts = [np.empty((0, len(sequence), 3))]
     for first in range(0, pairs.size, PAIRS_AT_ONCE):
         some = np.arange(first, min(first + PAIRS_AT_ONCE, pairs.size))
-        source, receiver = np.divmod(some, len(receivers))
+        source, receiver = (some, some) if paired else np.divmod(some, len(receivers))
         kept, vertices = _unfold(mirrors, sequence, images, sources, receivers, source, receiver)
         source, receiver = source[kept], receiver[kept]
         points = [sources[source], *np.moveaxis(vertices, 1, 0), ends[receiver]]
         clear = _clear(mirrors, sequence, points, blocked)
         pairs[some[kept[clear]]] = True
         parts.append(vertices[clear])
-    valid = pairs.reshape(len(sources), len(receivers))
+    valid = np.diag(pairs) if paired else pairs.reshape(len(sources), len(receivers))
     source, receiver = np.nonzero(valid)
     last = images[-1] if sequence else sources
     unfolded = receivers[receiver] - last[source]

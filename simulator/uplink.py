@@ -18,7 +18,7 @@ from simulator.ray_scene import blocked
 from simulator.reach import Sight
 from simulator.sights import array_sight, in_space, user_sight
 from simulator.specular_field import specular_response
-from simulator.specular_paths import find_chains
+from simulator.specular_paths import trace_chain
 
 
 def simulate_uplink(
@@ -109,13 +109,18 @@ def _over_mirrors(
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
     if scene.mirrors is None or most < 2:
         return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
-    chains = find_chains(
-        scene.mirrors.mirrors,
-        sender.positions,
-        array.positions,
-        blocked=partial(blocked, scene.rays),
-        min_bounces=2,
-        max_bounces=most,
+    # From the user the mirrors of a leg of the array are met in turn; other chains are out of
+    # the reach of the array's pattern, whatever the user's.
+    chains = (
+        trace_chain(
+            scene.mirrors.mirrors,
+            leg.sequence[::-1],
+            sender.positions,
+            array.positions,
+            blocked=partial(blocked, scene.rays),
+        )
+        for leg in scene.mirrors.chains
+        if 2 <= leg.bounces <= most
     )
     response: np.ndarray = specular_response(
         scene.mirrors.mirrors,

@@ -25,7 +25,7 @@ def appears(*ways: np.ndarray) -> np.ndarray:
     """Where an echo appears that goes out over one point of the wall and back over another."""
     lengths = [np.linalg.norm(facet) + np.linalg.norm(facet - TARGET) for facet in ways]
     sine = np.mean([facet[0] / np.linalg.norm(facet) for facet in ways])
-    return np.mean(lengths) * np.array([sine, np.sqrt(1 - sine**2), 0.0])
+    return np.asarray(np.mean(lengths) * np.array([sine, np.sqrt(1 - sine**2), 0.0]))
 
 
 def on_wall(share: float) -> np.ndarray:

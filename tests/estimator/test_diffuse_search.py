@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from jaxtyping import Float
@@ -5,7 +7,7 @@ from scipy.constants import speed_of_light
 
 from estimator.diffuse_location import with_diffuse_search
 from estimator.diffuse_search import SeenWall, further_distances, search_diffuse
-from estimator.estimate import UserEstimate
+from estimator.estimate import PathReport, UserEstimate
 from estimator.measurement import Uplink
 from estimator.mirror_fit import FittedLine
 from estimator.projection import Wall, mirrored
@@ -131,10 +133,47 @@ def test_the_diffuse_field_answers_where_no_path_stands_out() -> None:
     assert squared_error(answer.position - USER, answer.covariance) < 20
 
 
-def test_an_answer_from_paths_is_left_as_it_is() -> None:
+def path(share: float) -> PathReport:
+    return PathReport(aoa=1.5, path_length=0.8, share=share, mirrors=(0,), used=True)
+
+
+def test_an_answer_from_paths_that_the_diffuse_field_agrees_with_is_left_as_it_is() -> None:
     pilot = scattered_pilot(on(WALL), USER, 4)
-    found = UserEstimate(name="user", status="found", position=np.zeros(3), covariance=np.eye(3))
+    sharp = np.diag([1e-4, 1e-4, 0.0]) ** 2
+    found = UserEstimate(
+        name="user", status="found", position=USER, covariance=sharp, paths=(path(0.9),)
+    )
     assert with_diffuse_search(found, pilot, [line(WALL)], [WALL], [()]) is found
+
+
+def test_a_path_that_the_diffuse_field_contradicts_is_no_confident_answer() -> None:
+    pilot = scattered_pilot(on(WALL), USER, 4)
+    sharp = np.diag([1e-4, 1e-4, 0.0]) ** 2
+    elsewhere = UserEstimate(
+        name="user",
+        status="found",
+        position=np.array([0.2, 0.1, 0.0]),
+        covariance=sharp,
+        paths=(path(0.9),),
+    )
+    strong = with_diffuse_search(elsewhere, pilot, [line(WALL)], [WALL], [()])
+    assert strong.status == "ambiguous"
+    assert [one.method for one in strong.alternatives] == ["diffuse"]
+    weak = replace(elsewhere, paths=(path(0.2),))
+    answer = with_diffuse_search(weak, pilot, [line(WALL)], [WALL], [()])
+    assert (answer.status, answer.method) == ("found", "diffuse")
+
+
+def test_several_paths_that_agree_need_no_diffuse_search() -> None:
+    pilot = scattered_pilot(on(WALL), USER, 4)
+    two = UserEstimate(
+        name="user",
+        status="found",
+        position=np.zeros(3),
+        covariance=np.eye(3),
+        paths=(path(0.5), path(0.4)),
+    )
+    assert with_diffuse_search(two, pilot, [line(WALL)], [WALL], [()]) is two
 
 
 def test_of_ambiguous_places_the_one_that_the_diffuse_field_confirms_is_taken() -> None:

@@ -81,7 +81,6 @@ def test_a_folded_wall_errs_with_its_mirrors() -> None:
     # itself, so the angle's variances add up, the mirrors' four times.
     variances = [DEVIATIONS[0] ** 2 * (1 + 4 * before) for before in range(3)]
     found = np.diag(folded.covariance)[::2]
-    # The second mirror's own error holds the first one's: folding about both, it cancels once.
     assert found[0] == pytest.approx(variances[0], rel=1e-6)
     assert found[1] == pytest.approx(variances[1], rel=1e-6)
     for index, one in enumerate(folded.walls):
@@ -92,9 +91,9 @@ def test_a_folded_wall_errs_with_its_mirrors() -> None:
     draws = []
     for _ in range(200):
         shaken = []
-        for one in LINES:
+        for fitted in LINES:
             tilt, offset = DEVIATIONS * rng.standard_normal(2)
-            seen = Wall(start=one.start, end=one.end, covariance=one.covariance)
+            seen = Wall(start=fitted.start, end=fitted.end, covariance=fitted.covariance)
             moved = seen.moved(tilt=float(tilt), offset=float(offset))
             shaken.append(line(np.stack([moved.start, moved.end])))
         row = []

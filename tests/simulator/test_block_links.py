@@ -15,7 +15,8 @@ def rough_line(
     normal = np.array([-along[1], along[0]]) / np.hypot(*along)
     heights = rms * np.random.default_rng(seed).standard_normal(facets)
     places = (np.arange(facets) + 0.5) / facets
-    return np.asarray(np.array(start) + places[:, None] * along + heights[:, None] * normal
+    line: np.ndarray = np.array(start) + places[:, None] * along + heights[:, None] * normal
+    return line
 
 
 def circle(centre: tuple[float, float], radius: float, facets: int) -> Float[np.ndarray, "n 2"]:
