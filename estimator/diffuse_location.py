@@ -5,16 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
 from estimator.diffuse_search import DiffuseFix, SeenWall, search_diffuse
 from estimator.estimate import UserEstimate
 from estimator.measurement import Uplink
 from estimator.mirror_fit import FittedLine
-from estimator.projection import Wall, project
+from estimator.projection import Wall, mirrored, project
 
 MOST_ENERGY = 0.5
 """Share of the pilot's energy from which paths are not given up for what a wall scatters. [-]"""
+
+CELLS_APART = 3.0
+"""Cross-range cells λR/D from a strong path's place at which the diffuse field contradicts it:
+walls that are not quite where they were found move both, and each in its own way. [-]"""
 
 SAME = float(chi2.ppf(0.999, df=2))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
@@ -56,9 +61,11 @@ def with_diffuse_search(
     if fix is None:
         return answer
     diffuse = _placed(answer, fix, seen)
-    if answer.status == "found" and (len(fix.rivals) or _agree(answer, diffuse)):
+    if answer.status == "found" and (len(fix.rivals) or _confirms(diffuse, answer, walls)):
         return answer
     if answer.status == "found" and _share(answer) > MOST_ENERGY:
+        if not _far_apart(answer, diffuse, uplink):
+            return answer
         return replace(
             answer,
             status="ambiguous",
@@ -90,6 +97,15 @@ def _settled(answer: UserEstimate) -> bool:
 def _share(answer: UserEstimate) -> float:
     """Energy of the paths that an answer rests on, over the pilot's. [-]."""
     return sum(path.share for path in answer.paths if path.used)
+
+
+def _far_apart(answer: UserEstimate, diffuse: UserEstimate, uplink: Uplink) -> bool:
+    """Tell whether two places are beyond what errors of walls make of one and the same."""
+    if answer.position is None or diffuse.position is None or answer.path_length is None:
+        return True
+    wavelength = speed_of_light / float(uplink.frequencies.mean())
+    cell = wavelength / float(np.ptp(uplink.positions[:, 0])) * answer.path_length
+    return float(np.linalg.norm(answer.position - diffuse.position)) > CELLS_APART * cell
 
 
 def _spread(one: UserEstimate) -> float:
@@ -135,6 +151,28 @@ def _of_the_wall(position: Float[np.ndarray, " 3"], wall: Wall) -> Float[np.ndar
     jacobian = np.stack([turned, normal], axis=-1)
     covariance: np.ndarray = jacobian @ wall.covariance @ jacobian.T
     return covariance
+
+
+def _confirms(diffuse: UserEstimate, answer: UserEstimate, walls: Sequence[Wall]) -> bool:
+    """Tell whether a diffuse field comes from an answer, or from its image in a later mirror.
+
+    The first wall of a path over several scatters what it receives from the user's image in the
+    next one.
+    """
+    later = {index for path in answer.paths if path.used for index in (path.mirrors or ())[1:]}
+    shown = [answer, *(_image_in(answer, walls[index]) for index in sorted(later))]
+    return any(_agree(one, diffuse) for one in shown)
+
+
+def _image_in(answer: UserEstimate, wall: Wall) -> UserEstimate:
+    """Return an answer at the place where a wall shows it. [m]."""
+    if answer.position is None or answer.covariance is None:
+        return answer
+    image = mirrored(answer.position, wall.start, wall.end)
+    turn = mirrored(np.eye(3), np.zeros(3), wall.end - wall.start)
+    # Moving a mirror moves the image twice as far.
+    covariance = turn @ answer.covariance @ turn.T + 4 * _of_the_wall(image, wall)
+    return replace(answer, position=image, covariance=covariance)
 
 
 def _moved(answer: UserEstimate, place: Float[np.ndarray, " 3"]) -> UserEstimate:

@@ -12,7 +12,7 @@ from estimator.diffuse_location import with_diffuse_search
 from estimator.estimate import AngleRangeMap, Estimate, Progress, UserEstimate
 from estimator.localization_3d import locate_in_space
 from estimator.measurement import Echo, Measurement, Uplink, frequency_step
-from estimator.mirrors import echo_resolution, imaged_sine
+from estimator.mirrors import echo_reach, echo_resolution, imaged_sine
 from estimator.paths import find_paths
 from estimator.planar_array import spans_a_plane
 from estimator.resolution import largest_spacing
@@ -100,6 +100,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             loose=room.loose if room else np.zeros((0, 3)),
             wall_covariance=room.joint_covariance if room else None,
             clock_known=clock_known,
+            reach=echo_reach(local_echo)[1] if local_echo else np.inf,
         )
         if room and clock_known:
             found = with_diffuse_search(found, local, room.lines, room.walls, room.seen_through)

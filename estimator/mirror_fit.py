@@ -27,18 +27,22 @@ TRIALS = 9
 """Trial angles and trial offsets of each round."""
 ROUNDS = 4
 """Rounds; each looks at a third of the neighbourhood of the one before."""
-MODES = (2, 14)
-"""Smooth modes along the wall (Legendre's orders) that tell how strongly speckle pushes a line.
-A cell's speckle pushes its neighbours' part of the line the other way: the push of all cells is
-far weaker than that of independent ones, and its slow modes are what moves the line. Orders 0
-and 1, the offset and the tilt, are at rest at the summit; those next to them say how large they
-would be."""
-TILT_SHARE, OFFSET_SHARE = 0.7, 2.0
-"""Power of the modes of order 1 and 0 over the mean of the others: it rises with the order, and
-the offset is moved, besides, by what all cells share. From 204 realisations of six walls (20 and
-40 cm, 20° and 45°, 0.02 to 0.15 mm rms, metal and drywall, 30 and 75 GHz) the power was 0.2 to
-0.8 and 0.5 to 2.5 times that mean; the estimate of twelve modes, which varies itself, asks for
-1.2 times as much."""
+MODES = 20
+"""Smooth modes along the wall (Legendre's) that tell how strongly speckle pushes a line. A cell's
+speckle pushes its neighbours' part of the line the other way: the push of all cells is far weaker
+than that of independent ones, and its slow modes are what moves the line. Orders 0 and 1, the
+offset and the tilt, are at rest at the summit; the others, whose power rises with the order, say
+how large they would be."""
+RISES = (0.0, 0.1, 0.2, 0.4, 0.8, 1.6)
+"""By how much the modes' power may rise with each order, over that of order 0. [-]"""
+LEAST_POWER = 0.08
+"""Power of a slow mode, over that of independent places, that is assumed in any case. [-]"""
+TILT_SHARE, OFFSET_SHARE = 1.2, 3.0
+"""Power of the tilt's and the offset's mode over that expected of order 1; what all cells share
+moves the offset besides. From 204 realisations of six walls (20 and 40 cm, 20° and 45°, 0.02 to
+0.15 mm rms, metal and drywall, 30 and 75 GHz): 0.4 to 1.6, and 1.3 to 4.5."""
+FEWEST_PLACES = 4
+"""Places along a line that still have modes of a higher order than its tilt."""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
 CELLS_CUT = 2.0
@@ -116,6 +120,26 @@ def fit_line(
         if extent is None:
             return None
         start, end = extent
+    return fit_between(focus, tapered, start, end, resolution, trials=trials)
+
+
+def fit_between(
+    focus: Focus,
+    tapered: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    *,
+    trials: int,
+) -> FittedLine | None:
+    """Fit a line whose ends are known; see :func:`fit_line`.
+
+    Returns
+    -------
+    The line, or ``None`` if it is too short to have an angle.
+    """
+    if _places(start, end, resolution).size < FEWEST_PLACES:
+        return None
     start, end, covariance = _summit(focus, start, end, resolution)
     level, background = _levels(tapered, start, end, resolution)
     cells = np.linalg.norm(end - start) / _cell_along(start, end, resolution)
@@ -256,9 +280,8 @@ def _summit(
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]]:
     r"""Move the line to the summit of J and return it with the covariance of its place.
 
-    J is a sum over places i, near the summit :math:`c_i + g_i^T x + x^T H_i x / 2` each. The
-    covariance of the summit is the sandwich :math:`H^{-1} V H^{-1}`, with V that of the whole
-    gradient, from the smooth :data:`MODES` of the places' gradients.
+    J is a sum over places i, :math:`c_i + g_i x + h_i x^2 / 2` each near the summit. Where the
+    gradients :math:`g_i` of all places move the line is told by their smooth modes.
     """
     places = _places(start, end, resolution)
     length = float(np.linalg.norm(end - start))
@@ -273,18 +296,48 @@ def _summit(
     total = fits.sum(axis=-1)
     bread = np.linalg.inv(total[[3, 4, 4, 5]].reshape(2, 2))
     summit = np.clip(-bread @ total[1:3], -1.0, 1.0)
-    pushes = fits[2] + fits[4] * summit[0] + fits[5] * summit[1]
-    low, high = MODES[0], min(MODES[1], max(MODES[0] + 2, places.size // 3))
-    modes = np.linalg.qr(np.polynomial.legendre.legvander(2 * places / length, high - 1))[0]
-    power = float(np.mean((modes.T @ pushes)[low:] ** 2))
-    levers = float(np.sum((2 * places / length) ** 2))
-    variances = np.diag([TILT_SHARE * power * levers, OFFSET_SHARE * power * places.size])
-    covariance = bread @ variances @ bread
+    # Along the normal alone: a tilt moves the ends farther than a paraboloid describes.
+    lines = np.stack([np.ones_like(unit), unit, unit**2 / 2], axis=-1)
+    _, slopes, curvatures = np.linalg.lstsq(lines, magnitude[TRIALS // 2])[0]
+    pushes = slopes - curvatures * slopes.sum() / curvatures.sum()
+    levers = 2 * places / length
+    power = _slow_power(pushes, levers)
+    tilt_variance = TILT_SHARE * power * np.sum(levers**2) / np.sum(curvatures * levers**2) ** 2
+    offset_variance = OFFSET_SHARE * power * places.size / curvatures.sum() ** 2
+    covariance = np.diag([tilt_variance, offset_variance])
     tilt, offset = scale * summit
     ends = _trial_points(
         start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
     )[0, 0]
     return ends[0], ends[1], covariance * np.outer(scale, scale)
+
+
+def _slow_power(
+    pushes: Float[np.ndarray, " places"], across: Float[np.ndarray, " places"]
+) -> float:
+    """Expect the power of the mode of order 1 from those of higher orders.
+
+    Parameters
+    ----------
+    pushes
+        Gradient at each place.
+    across
+        The places, from -1 to 1.
+    """
+    count = min(MODES, max(4, len(pushes) // 3))
+    modes = np.linalg.qr(np.polynomial.legendre.legvander(across, count - 1))[0]
+    powers = (modes.T @ pushes)[2:] ** 2
+    orders = np.arange(2, count)
+    # Powers are χ² distributed about a line over the order: the likeliest of a few slopes.
+    likeliest = None
+    for rise in RISES:
+        shape = 1 + rise * orders
+        level = float(np.mean(powers / shape))
+        cost = float(np.sum(np.log(level * shape)))
+        if likeliest is None or cost < likeliest[0]:
+            likeliest = (cost, level * (1 + rise))
+    assert likeliest is not None
+    return max(likeliest[1], LEAST_POWER * float(np.mean(pushes**2)))
 
 
 def _levels(

@@ -1,7 +1,7 @@
 """Mirrors: the walls that an image shows, found without help."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
@@ -10,7 +10,7 @@ from scipy.constants import speed_of_light
 from estimator.backprojection import Focuser, backproject, focus, prepare
 from estimator.line_search import LineCandidate, Resolution, find_lines, significant_peaks
 from estimator.measurement import Echo, MeasurementError, frequency_step
-from estimator.mirror_fit import FittedLine, Focus, fit_line
+from estimator.mirror_fit import FittedLine, Focus, fit_between, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 from estimator.resolution import HALF_POWER, unaliased_sine
@@ -31,9 +31,15 @@ and more than 12 % to three quarters of the clouds', 60 % in the median. [-]"""
 LEAST_COHERENCE = 0.02
 """Coherence of a peak that is one wave at all: sidelobes and the remains of what is nearer than
 the array is long have 1/M of M channels, speckle in a cell with twenty more has 0.05. [-]"""
-MOST_BENT = 0.6
-"""Share of bent peaks on a ghost's line: of a wall that faces the array, where many facets share a
-range, half are; of the lines that a cloud feigns, three quarters. [-]"""
+MOST_BENT = 0.4
+"""Share of bent peaks on a wall's line. Of walls 0.3 to 1.7 m away at all angles, in simulated and
+full-wave echoes, a quarter at most are: those that nearly face the array, where many facets share a
+range. Of the lines that clouds and grating lobes feign, from half to all of them are. [-]"""
+WALL_COHERENCE = 0.2
+"""Median coherence of the peaks on a wall that does not reflect the array in itself. Of the same
+walls it was 0.3 to 0.98; of what the ambiguities of range and angle feign, 0.04 and 0.1. [-]"""
+EDGE_DEVIATIONS = 3.0
+"""Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
 MOST_CANDIDATES = 8
 """Lines sought among all peaks, bent ones included."""
 MOST_UNCERTAIN = 0.5
@@ -184,7 +190,13 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         focus_within(prepare(range_profiles(echo, weights=weights)), farthest)
         for weights in (None, _taper_weights(echo))
     )
-    lines = _best_of(_fitted(echo, looked, candidates, *focuses), coarse)
+    half = 0.5 * float(np.ptp(echo.positions[:, 0]))
+    lines = [
+        line
+        for line in _best_of(_fitted(echo, looked, candidates, *focuses), coarse)
+        if not _is_edge_on(line, half)
+    ]
+    lines = _cut_where_they_cross(lines, *focuses, echo_resolution(echo))
     in_sight = [line for line in lines if not _is_hidden(line, lines)]
     # Behind a mirror are clouds as well: there only what is seen, not scattered twice, counts.
     behind = np.array(
@@ -199,9 +211,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     for line in _best_of(_fitted(echo, looked, ghosts, *focuses), coarse):
         if any(_overlap(line, known, coarse) for known in in_sight):
             continue
-        on = np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
-        bent = np.count_nonzero(looked.bent & on)
-        if _is_hidden(line, in_sight) and bent <= MOST_BENT * np.count_nonzero(on):
+        if _is_hidden(line, in_sight) and not _is_edge_on(line, half):
             in_sight.append(line)
     return tuple(sorted(in_sight, key=lambda line: -line.level))
 
@@ -242,8 +252,37 @@ def _fitted(
         uncertain = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
         if np.any(uncertain > MOST_UNCERTAIN * float(resolution.cell(line.middle, across))):
             continue
-        lines.append(line)
+        if _is_of_waves(line, looked, coarse):
+            lines.append(line)
     return lines
+
+
+def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
+    """Tell whether the peaks on a line are waves that come from there, as a wall's are."""
+    on = np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
+    if not on.any():
+        return True
+    if np.mean(looked.bent[on]) > MOST_BENT:
+        return False
+    reflects = bool(np.any(looked.as_mirror[on] >= REFLECTED))
+    coherent = np.maximum(looked.as_point, looked.as_mirror)[on]
+    return reflects or float(np.median(coherent)) >= WALL_COHERENCE
+
+
+def _is_edge_on(line: FittedLine, half: float) -> bool:
+    """Tell whether a line points at the array, which so sees both faces: it mirrors to neither.
+
+    Parameters
+    ----------
+    line
+        In the array's frame.
+    half
+        Half the length of the array. [m]
+    """
+    normal = np.array([line.direction[1], -line.direction[0], 0.0])
+    deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
+    reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
+    return abs(float(line.middle @ normal)) < reach
 
 
 def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine]:
@@ -253,6 +292,34 @@ def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine
         if not any(_overlap(line, one, coarse) for one in kept):
             kept.append(line)
     return kept
+
+
+def _cut_where_they_cross(
+    lines: Sequence[FittedLine], plain: Focus, tapered: Focus, resolution: Resolution
+) -> list[FittedLine]:
+    """Cut what lies behind another line off a line that crosses it.
+
+    Walls that meet at a right angle each continue in the other's mirror image, straight: the
+    image shows a cross, of which the halves behind the other wall are ghosts.
+    """
+    cut: list[FittedLine] = []
+    for line in lines:
+        start, end = line.start, line.end
+        for other in lines:
+            hit = None if other is line else crossing(start, line.direction, other.start, other.end)
+            if hit is None or hit[0] >= float(np.linalg.norm(end - start)):
+                continue
+            meeting = start + hit[0] * line.direction
+            halves = [hides(other, 0.5 * (meeting + tip)) for tip in (start, end)]
+            if halves == [True, False]:
+                start = meeting
+            elif halves == [False, True]:
+                end = meeting
+        if start is line.start and end is line.end:
+            cut.append(line)
+        elif (shorter := fit_between(plain, tapered, start, end, resolution, trials=1)) is not None:
+            cut.append(replace(shorter, confidence=line.confidence))
+    return cut
 
 
 def _overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:

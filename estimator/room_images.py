@@ -43,6 +43,7 @@ def room_images(
 
     shown = [np.zeros((1, 3)), echo.positions, room.survey.peaks, *paths]
     shown += [np.stack([wall.start, wall.end]) for wall in room.walls]
+    shown += [np.stack([target.position, target.ghost]) for target in room.targets]
     grid = _grid(frame.to_world(np.concatenate(shown)), echo_resolution(echo).along_ray)
     points = frame.to_local(grid.points)
     raw = Image(values=focus_in_reach(points), grid=grid)

@@ -41,6 +41,7 @@ class Surroundings:
     cell: float  # how well the image tells where a wall ends, as an angle [rad]
     imaged: bool  # whether there was an echo: without, nothing is known of mirrors
     loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
+    reach: float  # how far the image shows what there is [m]
 
 
 def decide(
@@ -53,6 +54,7 @@ def decide(
     loose: Float[np.ndarray, "peaks 3"],
     wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
     clock_known: bool = True,
+    reach: float = np.inf,
 ) -> UserEstimate:
     """Locate a user in the array's frame.
 
@@ -74,6 +76,8 @@ def decide(
         Of (angle, offset) of all walls, one after the other; ``None``: that of each alone.
     clock_known
         Whether delays are lengths; if not, the offset is found from two or more paths.
+    reach
+        How far the image shows what there is. [m]
 
     Returns
     -------
@@ -90,6 +94,7 @@ def decide(
         cell=cell,
         imaged=imaged,
         loose=loose,
+        reach=reach,
     )
     answer = (_on_our_clock if clock_known else _on_any_clock)(name, found, room)
     if answer.status == "found" and not imaged:
@@ -408,5 +413,13 @@ def _if_nothing_stands_in_the_way(
             line_of_sight=None,
             reason=f"something stands on the straight way at ({thing[0]:.3f}, {thing[1]:.3f}) m: "
             "if it is a mirror too short to be told as one, the user is elsewhere",
+        )
+    if wave.path_length > room.reach:
+        return replace(
+            answer,
+            status="ambiguous",
+            line_of_sight=None,
+            reason=f"the straight way is {wave.path_length:.2f} m long, and the image shows what "
+            f"stands on it to {room.reach:.2f} m only; take smaller frequency steps",
         )
     return answer

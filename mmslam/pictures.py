@@ -16,6 +16,8 @@ from validation.resolution_bars import draw_resolution_bars
 from validation.truth import Truth
 
 DOTS_PER_INCH = 150
+_DEEPEST_DB = -100.0  # below it there is hardly an image
+_NEAR = 0.01  # of a thing found, what the image shows of it [m]
 _CLOSE_UPS = 3  # users shown enlarged; more would be too small to read
 
 
@@ -107,9 +109,12 @@ def image_figure(
     """
     images = [shown for shown in (estimate.raw_image, estimate.corrected_image) if shown]
     bright = [views.bright_points(shown) for shown in images]
-    view = views.view_around(np.concatenate([views.estimate_points(estimate, positions), *bright]))
+    ghosts = views.ghost_points(estimate)
+    shown = [views.estimate_points(estimate, positions), ghosts, *bright]
+    view = views.view_around(np.concatenate(shown))
     figure = _figure(view, extra_width=1.1)
-    ax = figures.draw_image(figure.subplots(), image, view=view)
+    floor_db = _floor_db(image, estimate, ghosts, corrected=corrected)
+    ax = figures.draw_image(figure.subplots(), image, view=view, floor_db=floor_db)
     figures.overlay_mirrors(ax, estimate.mirrors, line=corrected)
     figures.overlay_array(ax, positions, colour=figures.ON_DARK)
     if frequencies is not None:
@@ -122,6 +127,23 @@ def image_figure(
         "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
     )
     return figure
+
+
+def _floor_db(
+    image: Image,
+    estimate: Estimate,
+    ghosts: Float[np.ndarray, "points 3"],
+    *,
+    corrected: bool,
+) -> float:
+    """Choose the darkest level so that the faintest thing found is seen, in steps of 10 dB."""
+    middles = [0.5 * (mirror.start + mirror.end) for mirror in estimate.mirrors]
+    places = [target.position for target in estimate.targets]
+    things = np.array([*middles, *places]).reshape(-1, 3) if corrected else ghosts
+    faintest = views.faintest_db(image, things, within=_NEAR)
+    if faintest is None:
+        return figures.FLOOR_DB
+    return float(np.clip(10 * np.floor((faintest - 10) / 10), _DEEPEST_DB, figures.FLOOR_DB))
 
 
 def _brightest_point(image: Image) -> Float[np.ndarray, " 3"]:

@@ -59,7 +59,7 @@ class AntennaPattern:
         """Angle between unit directions and the axis, 0…π. [rad]."""
         apart = directions - self.aim
         half = np.sqrt(np.einsum("...x,...x->...", apart, apart)) / 2
-        return 2 * np.arcsin(np.minimum(half, 1.0))
+        return np.asarray(2 * np.arcsin(np.minimum(half, 1.0)))
 
     def field_off_axis(self, angles: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
         """Field over that on the axis, at angles off it; it falls with the angle. [-]."""
@@ -68,16 +68,15 @@ class AntennaPattern:
         if isinstance(self.antenna, Cosine):
             front = np.cos(np.minimum(angles, np.pi / 2))
             return np.where(angles < np.pi / 2, front**self.power, 0.0)
-        return np.exp(-0.5 * (angles / self.width) ** 2)
+        return np.asarray(np.exp(-0.5 * (angles / self.width) ** 2))
 
     def slope_off_axis(self, angles: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
         """By how much the logarithm of the field falls with the angle off the axis. [1/rad]."""
         if isinstance(self.antenna, Isotropic):
             return np.zeros_like(angles)
         if isinstance(self.antenna, Cosine):  # at the edge of the half space it ends abruptly
-            return self.power * np.tan(np.minimum(angles, np.pi / 2 - 1e-6)) + np.where(
-                angles < np.pi / 2 - 0.05, 0.0, np.inf
-            )
+            abrupt = np.where(angles < np.pi / 2 - 0.05, 0.0, np.inf)
+            return np.asarray(self.power * np.tan(np.minimum(angles, np.pi / 2 - 1e-6)) + abrupt)
         return angles / self.width**2
 
 

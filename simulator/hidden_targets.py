@@ -8,6 +8,8 @@ roughness. The direct way out and back is left to plain physical optics. Of a ch
 targets the later one is cut into facets, and the other one is a mirror. What no target is part of
 (three walls of a corner) is an image of the antenna itself.
 
+The diffuse part is that of :mod:`simulator.diffuse_ghosts`.
+
 What is neglected: which part of a target a leg lights is found patch by patch, from one facet of
 each; the antennas' vertical field stays vertical at the target; chains of two targets of which the
 earlier is curved.
@@ -20,6 +22,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from simulator.diffuse_ghosts import diffuse_echo
 from simulator.facet_reflection import reflection_nodes
 from simulator.facets import Facets
 from simulator.free_space import direct_wave
@@ -44,6 +47,16 @@ def echo_over_mirrors(
     scene: RadioScene, send: Sight, receive: Sight
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum the echoes over two and more surfaces, up to the scenario's ``max_bounces``.
+
+    Coherent and diffuse: see :func:`coherent_echo` and :mod:`simulator.diffuse_ghosts`.
+    """
+    return np.asarray(coherent_echo(scene, send, receive) + diffuse_echo(scene, send, receive))
+
+
+def coherent_echo(
+    scene: RadioScene, send: Sight, receive: Sight
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the coherent part of the echoes over two and more surfaces.
 
     Parameters
     ----------

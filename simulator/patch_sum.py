@@ -13,7 +13,7 @@ from estimator.engine import thread_count
 from simulator.facet_reflection import echo_coefficient, reflection_nodes
 from simulator.facets import Facets
 from simulator.few_positions import GAIN, Aperture, find_aperture, node_counts
-from simulator.frequency_sum import FrequencySum, chebyshev_nodes, nodes_needed
+from simulator.frequency_sum import FrequencySum, chebyshev_nodes, lagrange_basis, nodes_needed
 from simulator.materials import Absorber, Conductor, Material
 from simulator.patch_kernel import Links, PatchKernel
 from simulator.patches import Patches, cut_into_patches, patch_side
@@ -144,10 +144,14 @@ class _Work:
     ) -> None:
         start, stop = float(frequencies[0]), float(frequencies[-1])
         delays = 4 * float(patches.radii.max()) / speed_of_light  # there and back, about the centre
-        nodes = nodes_needed(delays, stop - start, accuracy=ACCURACY) + factor_nodes - 1
+        nodes = nodes_needed(delays, stop - start, accuracy=ACCURACY)
         if not links.echo:
             nodes += reflection_nodes(material, start, stop, accuracy=COEFFICIENT_ACCURACY) - 1
-        self.total = FrequencySum(frequencies, chebyshev_nodes(start, stop, nodes))
+        # The triangles are summed at few frequencies; the factor may need more.
+        self.few = chebyshev_nodes(start, stop, nodes)
+        self.total = FrequencySum(
+            frequencies, chebyshev_nodes(start, stop, nodes + factor_nodes - 1)
+        )
         self.material, self.links, self.factor = material, links, factor
         self.aperture = find_aperture(links)
 
@@ -199,15 +203,15 @@ class _Work:
         *,
         mask: Bool[np.ndarray, "facets links"] | None = None,
     ) -> None:
-        kernel = PatchKernel(patches, self.material, self.total.nodes)
+        kernel = PatchKernel(patches, self.material, self.few)
         links, basis = self.links, None
         if aperture is not None and counts is not None:
             links, basis = aperture.nodes(counts, links)
         sums = kernel(links, mask)
         if self.factor is not None:
-            sums = (sums * self.factor(links, patches.centres, self.total.nodes)).astype(
-                np.complex64
-            )
+            between = lagrange_basis(self.few, self.total.nodes).astype(np.float32)
+            sums = np.einsum("pln,nm->plm", sums, between)
+            sums *= self.factor(links, patches.centres, self.total.nodes)
         shape = (patches.count, self.total.nodes.size)
         # [places, patches x nodes x 2]
         places = np.ascontiguousarray(np.moveaxis(sums, 1, 0)).reshape(sums.shape[1], -1)

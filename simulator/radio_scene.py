@@ -29,6 +29,7 @@ from simulator.permittivity import (
 )
 from simulator.physical_optics import Pattern, Ports, isotropic
 from simulator.ray_scene import build_scene, facets_visible
+from simulator.rough_legs import diffuse_legs
 from simulator.scene_mirrors import SceneMirrors, scene_mirrors
 from simulator.sights import array_sight, in_space, needed_reach, sending_sight
 
@@ -74,7 +75,12 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
         reach: Reach | None = None
         if mirrors is not None and not absorbs:
             legs = mirrors.legs if name in mirrors.targets else ()
-            reach = needed_reach(scenario, elements, legs)
+            rough = [
+                one
+                for one in diffuse_legs(mirrors.mirrors, mirrors.chains)
+                if mirrors.owners[one.rough] == name
+            ]
+            reach = needed_reach(scenario, elements, legs, rough)
         surface = object_surface(scenario, name, seed=seed, sample=sample, reach=reach)
         surfaces.append(surface)
         if len(surface.cells) and not absorbs:

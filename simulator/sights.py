@@ -5,13 +5,14 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from scenes.antenna import Antenna
 from scenes.scenario import Scenario
 from scenes.tiled_faces import Reach
-from simulator.antenna_pattern import AntennaPattern
+from simulator.antenna_pattern import ISOTROPIC, AntennaPattern
 from simulator.reach import Sight, in_reach
+from simulator.rough_legs import DIFFUSE_LEVEL, DiffuseLeg
 from simulator.specular_legs import DIRECT, Leg
 
 
@@ -40,7 +41,10 @@ def user_sight(scenario: Scenario, name: str) -> Sight:
 
 
 def needed_reach(
-    scenario: Scenario, elements: Float[np.ndarray, "elements 3"], legs: Sequence[Leg]
+    scenario: Scenario,
+    elements: Float[np.ndarray, "elements 3"],
+    legs: Sequence[Leg],
+    rough: Sequence[DiffuseLeg] = (),
 ) -> Reach:
     """Tell where facets of an object are needed.
 
@@ -52,6 +56,8 @@ def needed_reach(
         Where the array's antennas truly stand. [m]
     legs
         Ways over mirrors on which the object is seen, too.
+    rough
+        Ways over several mirrors, of which the object is the one that scatters diffusely.
     """
     array = array_sight(scenario, elements)
     send = sending_sight(scenario, elements) or array
@@ -61,8 +67,32 @@ def needed_reach(
         for out, back in product((DIRECT, *legs), repeat=2)
         if out.bounces + back.bounces <= most
     ]
-    pairs += [(user_sight(scenario, name), array) for name in scenario.users]
-    return partial(in_reach, pairs)
+    users = [user_sight(scenario, name) for name in scenario.users]
+    pairs += [(user, array) for user in users]
+    over_several = []
+    for chain in rough:
+        ends = {id(sight): chain.before.image(sight) for sight in (send, array)}
+        if chain.bounces <= most and chain.before.bounces:  # to a target, in any direction
+            over_several += [(end, _anywhere(end)) for end in ends.values()]
+        if chain.bounces > 1:
+            over_several += [(chain.after.image(user), ends[id(array)]) for user in users]
+    return partial(_either, pairs, over_several)
+
+
+def _anywhere(sight: Sight) -> Sight:
+    return Sight(positions=sight.positions[:1], pattern=ISOTROPIC)
+
+
+def _either(
+    pairs: Sequence[tuple[Sight, Sight]],
+    diffuse: Sequence[tuple[Sight, Sight]],
+    centres: Float[np.ndarray, "spheres 3"],
+    radius: float,
+) -> Bool[np.ndarray, " spheres"]:
+    reached: np.ndarray = in_reach(pairs, centres, radius)
+    left = np.flatnonzero(~reached)
+    reached[left] = in_reach(diffuse, centres[left], radius, level=DIFFUSE_LEVEL)
+    return reached
 
 
 def _sight(scenario: Scenario, antenna: Antenna, positions: Float[np.ndarray, "n 3"]) -> Sight:

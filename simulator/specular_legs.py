@@ -46,6 +46,20 @@ class Leg:
         places = np.einsum("xy,ny->nx", self.turn, sight.positions) + self.shift
         return Sight(positions=places, pattern=pattern)
 
+    def onward(self, mirrors: Mirrors, *sequence: int) -> "Leg":
+        """Go on over more mirrors."""
+        leg = self
+        for mirror in sequence:
+            normal = mirrors.normals[mirror]
+            turn = np.eye(3) - 2 * np.outer(normal, normal)
+            base = 2 * float((mirrors.corners[mirror, 0] * normal).sum()) * normal
+            leg = Leg(
+                sequence=(*leg.sequence, mirror),
+                turn=np.einsum("xy,yz->xz", turn, leg.turn),
+                shift=np.einsum("xy,y->x", turn, leg.shift) + base,
+            )
+        return leg
+
 
 DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
 """The leg without mirrors."""
@@ -78,14 +92,7 @@ def legs_within_reach(mirrors: Mirrors, sights: Sequence[Sight], most: int) -> t
                 _reflects(mirrors, mirror, image) for image in images
             ):
                 continue
-            normal = mirrors.normals[mirror]
-            turn = np.eye(3) - 2 * np.outer(normal, normal)
-            base = 2 * float((mirrors.corners[mirror, 0] * normal).sum()) * normal
-            longer = Leg(
-                sequence=(*leg.sequence, mirror),
-                turn=np.einsum("xy,yz->xz", turn, leg.turn),
-                shift=np.einsum("xy,y->x", turn, leg.shift) + base,
-            )
+            longer = leg.onward(mirrors, mirror)
             yield longer
             yield from grown(longer)
 

@@ -8,6 +8,7 @@ from jaxtyping import Complex
 
 from scenes.scenario import User
 from simulator.antennas import field_gain
+from simulator.diffuse_legs import diffuse_wave
 from simulator.free_space import direct_wave
 from simulator.ghost_echo import SeveralProgress, untold, uplink_over_surfaces
 from simulator.line_of_sight import in_line_of_sight
@@ -16,6 +17,7 @@ from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, facet_ports
 from simulator.ray_scene import blocked
 from simulator.reach import Sight
+from simulator.rough_legs import diffuse_legs
 from simulator.sights import array_sight, in_space, user_sight
 from simulator.specular_field import specular_response
 from simulator.specular_paths import trace_chain
@@ -29,7 +31,7 @@ def simulate_uplink(
     advance: Callable[[], None],
     over_several: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Simulate one user's noise-free pilot: direct, over one bounce, in 2-D also over more.
+    """Simulate one user's noise-free pilot: direct, over one bounce and over more.
 
     Over a single rough mirror the facets give the coherent and the diffuse part at once, so
     that no specular leg is added to them.
@@ -59,7 +61,9 @@ def simulate_uplink(
             array_sight(scene.scenario, scene.elements),
         )
         over_one = scattered_in_space(scene, sender, array_there, advance=advance)
-        return np.asarray(pilot + over_one + _over_mirrors(scene, sender, array_there))
+        over_more_there = _over_mirrors(scene, sender, array_there)
+        over_more_there += _diffuse_over_mirrors(scene, sender, array_there)
+        return np.asarray(pilot + over_one + over_more_there)
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])
@@ -131,3 +135,17 @@ def _over_mirrors(
         receive=array.pattern.towards,
     )
     return np.asarray(response[0])
+
+
+def _diffuse_over_mirrors(
+    scene: RadioScene, sender: Sight, array: Sight
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Sum what one rough mirror of two and more scatters diffusely, in space."""
+    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
+    response = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    if scene.mirrors is None or most < 2:
+        return response
+    chains = [leg for leg in scene.mirrors.chains if 2 <= leg.bounces <= most]
+    for chain in diffuse_legs(scene.mirrors.mirrors, chains):
+        response += diffuse_wave(scene, chain, array, sender)
+    return response

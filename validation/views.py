@@ -61,6 +61,45 @@ def estimate_points(
     return np.concatenate(points)
 
 
+def ghost_points(estimate: Estimate) -> Float[np.ndarray, "points 3"]:
+    """Collect where the raw image shows what is seen through mirrors."""
+    points = [target.ghost[None] for target in estimate.targets]
+    for mirror in estimate.mirrors:
+        ends = np.stack([mirror.start, mirror.end])
+        for index in reversed(mirror.seen_through):
+            about = estimate.mirrors[index]
+            ends = ends - 2 * ((ends - about.start) @ about.normal)[:, None] * about.normal
+        points.append(ends)
+    return np.concatenate(points) if points else np.zeros((0, 3))
+
+
+def faintest_db(
+    image: Image, things: Float[np.ndarray, "things 3"], *, within: float
+) -> float | None:
+    """Return the level of the faintest of some things in an image, relative to its peak. [dB].
+
+    Parameters
+    ----------
+    image
+        In a plane.
+    things
+        Where they are; those outside the image do not count. [m]
+    within
+        The brightest pixel within this distance along x and y is a thing's level. [m]
+    """
+    magnitude = brightest_plane(image)
+    peak = float(magnitude.max())
+    levels = []
+    for thing in things:
+        near = np.ix_(
+            np.abs(image.grid.x - thing[0]) <= within, np.abs(image.grid.y - thing[1]) <= within
+        )
+        level = float(magnitude[near].max(initial=0.0))
+        if level > 0:
+            levels.append(20 * np.log10(level / peak))
+    return min(levels) if levels else None
+
+
 def bright_points(image: Image, *, threshold_db: float = -20.0) -> Float[np.ndarray, "2 3"]:
     """Return two corners of the box that holds nearly all of what is bright in an image.
 

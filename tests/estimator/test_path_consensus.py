@@ -66,7 +66,8 @@ def test_it_is_the_least_squares_over_position_clock_and_walls(kinds: int) -> No
     full = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     # The walls' errors enter to first order: products of 1e-4 with 1e-4 are left out.
     np.testing.assert_allclose(found.position[:2], full.x[:2], atol=3e-7)
-    covariances = np.linalg.inv(full.jac.T @ full.jac)[:2, :2]
+    jacobian = np.asarray(full.jac)
+    covariances = np.linalg.inv(jacobian.T @ jacobian)[:2, :2]
     np.testing.assert_allclose(found.covariance[:2, :2], covariances, rtol=0, atol=
                                2e-3 * np.trace(covariances))  # fmt: skip
     assert found.mismatch == pytest.approx(2 * full.cost, rel=2e-2)

@@ -163,7 +163,7 @@ def test_the_distance_to_a_triangle_is_that_to_the_nearest_of_its_points() -> No
     triangles = rng.normal(size=(200, 3, 3))
     point = rng.normal(size=3)
     repeated = np.broadcast_to(point, (200, 3))
-    closest = trimesh.triangles.closest_point(triangles, repeated)
+    closest = trimesh.triangles.closest_point(triangles, repeated)  # type: ignore[no-untyped-call]
     np.testing.assert_allclose(
         distances_to_triangles(point, triangles),
         np.linalg.norm(closest - point, axis=-1),

@@ -45,9 +45,7 @@ def whole(scenario: Scenario) -> RadioScene:
     """The same scene with facets all over."""
     blind = scenario.model_copy(
         update={
-            "base_station": scenario.base_station.model_copy(
-                update={"antenna": Isotropic()}
-            ),
+            "base_station": scenario.base_station.model_copy(update={"antenna": Isotropic()}),
             "users": {},
         }
     )

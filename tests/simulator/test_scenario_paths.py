@@ -6,8 +6,8 @@ import pytest
 
 from scenes.library import load_scenario
 from scenes.scenario import Scenario, parse_scenario
-from simulator.radio_scene import scenario_materials
 from simulator.mean_surfaces import mean_mirrors, mean_surfaces
+from simulator.radio_scene import scenario_materials
 from simulator.scenario_paths import scenario_paths
 
 BASE = {

@@ -7,9 +7,9 @@ from scipy.constants import speed_of_light
 
 from scenes.library import load_scenario
 from scenes.scenario import Scenario, parse_scenario
+from simulator.mean_surfaces import mean_surfaces
 from simulator.permittivity import MaterialError
 from simulator.radio_materials import scattering_coefficient
-from simulator.mean_surfaces import mean_surfaces
 from simulator.sionna_scene import sionna_scene, stand_back
 
 
