@@ -25,9 +25,11 @@ from scipy.constants import speed_of_light
 
 from scenes.scenario import parse_scenario
 from simulator.facets import Facets
+from simulator.links_in_space import scattered_in_space
 from simulator.physical_optics import Ports, facet_transform, isotropic, scattered
 from simulator.radio_scene import RadioScene, radio_scene
 from simulator.ray_scene import CLEARANCE, facets_visible
+from simulator.sights import array_sight
 
 POSITIONS = 260
 DIRECT_FACETS, DIRECT_FREQUENCIES = 20_000, 101
@@ -102,27 +104,26 @@ def _single(vectors: Float[np.ndarray, "facets 3"]) -> list[mi.Float]:
 
 
 def against_rays() -> None:
-    """Compare (a) the whole echo over the bare rays, in turns of 20 positions."""
+    """Compare (a) the whole echo, as the simulator makes it, with the bare rays of all facets."""
     begin = time.perf_counter()
     scene = wall_scene()
     built = time.perf_counter() - begin
     positions = scene.scenario.base_station.element_positions
-    echo(scene, positions[:2])  # compiles
+    array = array_sight(scene.scenario, positions)
+    few = replace(array, positions=positions[:2])
+    scattered_in_space(scene, few, few)  # compiles
     bare_rays(scene, positions[:2])
-    rays = visibility = whole = 0.0
-    for first in range(0, POSITIONS, 20):
-        some = positions[first : first + 20]
-        rays += bare_rays(scene, some)
-        begin = time.perf_counter()
-        visibility += echo(scene, some)[1]
-        whole += time.perf_counter() - begin
+    # Half of the rays before and half after, as the machine's speed may drift.
+    rays = bare_rays(scene, positions[::2])
+    begin = time.perf_counter()
+    scattered_in_space(scene, array, array)
+    whole = time.perf_counter() - begin
+    rays += bare_rays(scene, positions[1::2])
     count = wall_facets(scene).count
     print(f"(a) {count} facets, {POSITIONS} positions, 1001 frequencies")
     for name, seconds in {
         "bare ray_test": rays,
-        "visibility, with making the rays": visibility,
-        "geometry and sums": whole - visibility,
-        "echo, whole": whole,
+        "echo, whole: visibility and sums": whole,
         "building the scene, once (apart)": built,
     }.items():
         print(f"    {name:36s} {seconds:8.2f} s {seconds / rays:6.2f} x bare rays")
@@ -217,8 +218,9 @@ def against_frequencies() -> None:
 def peak_memory(scale: float) -> None:
     """Measure (d) the most memory that this process ever held, over all positions of a wall."""
     scene = wall_scene(scale=scale)
+    array = array_sight(scene.scenario, scene.scenario.base_station.element_positions)
     begin = time.perf_counter()
-    echo(scene, scene.scenario.base_station.element_positions)
+    scattered_in_space(scene, array, array)
     seconds = time.perf_counter() - begin
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(

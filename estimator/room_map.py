@@ -12,7 +12,7 @@ from estimator.mirror_fit import FittedLine
 from estimator.mirrors import Survey, detect_mirrors, echo_resolution, loose_peaks, survey
 from estimator.projection import Wall
 from estimator.targets import find_targets
-from estimator.wall_folding import fold_lines
+from estimator.wall_folding import fold_seen_lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ def build_room_map(echo: Echo) -> RoomMap:
     looked = survey(echo)
     found = detect_mirrors(echo, looked)
     resolution = echo_resolution(echo)
-    folded = fold_lines(found, resolution)
+    folded = fold_seen_lines(found, resolution)
     aperture = float(np.ptp(echo.positions[:, 0]))
     return RoomMap(
         lines=folded.lines,

@@ -42,6 +42,7 @@ class Surroundings:
     imaged: bool  # whether there was an echo: without, nothing is known of mirrors
     loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
     reach: float  # how far the image shows what there is [m]
+    widest: float  # sine of the angle from boresight to which it does [-]
 
 
 def decide(
@@ -55,6 +56,7 @@ def decide(
     wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
     clock_known: bool = True,
     reach: float = np.inf,
+    widest: float = 1.0,
 ) -> UserEstimate:
     """Locate a user in the array's frame.
 
@@ -78,6 +80,8 @@ def decide(
         Whether delays are lengths; if not, the offset is found from two or more paths.
     reach
         How far the image shows what there is. [m]
+    widest
+        Sine of the angle from boresight to which it does. [-]
 
     Returns
     -------
@@ -95,6 +99,7 @@ def decide(
         imaged=imaged,
         loose=loose,
         reach=reach,
+        widest=widest,
     )
     answer = (_on_our_clock if clock_known else _on_any_clock)(name, found, room)
     if answer.status == "found" and not imaged:
@@ -421,5 +426,14 @@ def _if_nothing_stands_in_the_way(
             line_of_sight=None,
             reason=f"the straight way is {wave.path_length:.2f} m long, and the image shows what "
             f"stands on it to {room.reach:.2f} m only; take smaller frequency steps",
+        )
+    if abs(np.cos(wave.aoa)) > room.widest:
+        return replace(
+            answer,
+            status="ambiguous",
+            line_of_sight=None,
+            reason=f"the image does not show what stands on the straight way at "
+            f"{np.degrees(wave.aoa):.1f}°, but only what is within "
+            f"{np.degrees(np.arcsin(room.widest)):.1f}° of boresight",
         )
     return answer

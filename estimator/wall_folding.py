@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from estimator.diffuse_cloud import between
 from estimator.line_search import Resolution
 from estimator.mirror_chains import DEEPEST, Chain, unfolded
 from estimator.mirror_fit import FittedLine
@@ -21,6 +22,8 @@ SAMPLES = 9
 """Places along a line at which it is asked what stands before them."""
 SAME_PLACE = 3.0
 """Cells within which a folded line and a wall that is seen otherwise are one."""
+MIXED_SAMPLES = 65
+"""Places along a wall whose two views are mixed: closer than the cells of the mixture."""
 STEP = 1e-6
 """Of the numerical derivatives. [rad], [m]."""
 
@@ -76,6 +79,30 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
         seen_through=chains,
         covariance=joint,
     )
+
+
+def fold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
+    """Fold lines as :func:`fold_lines` does, without those that are two views of a wall mixed.
+
+    What goes out over a mirror and comes back directly shows a wall that is seen both ways a third
+    time, halfway between the two views, as sharply as they are.
+    """
+    folded = fold_lines(lines, resolution)
+    seen = [line for line in lines if not _is_mixed(line, folded, resolution)]
+    return folded if len(seen) == len(lines) else fold_lines(seen, resolution)
+
+
+def _is_mixed(line: FittedLine, folded: FoldedWalls, resolution: Resolution) -> bool:
+    """Tell whether most of a line is halfway between another's place and its wall's."""
+    points = np.linspace(line.start, line.end, SAMPLES)
+    for other, wall, chain in zip(folded.lines, folded.walls, folded.seen_through, strict=True):
+        if other is line or not chain:
+            continue
+        views = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
+        mixed = [between(points, *pair, resolution) for pair in zip(*views, strict=True)]
+        if np.mean(np.any(mixed, axis=0)) > 0.5:
+            return True
+    return False
 
 
 def _from_the_array_outward(lines: Sequence[FittedLine]) -> list[FittedLine]:

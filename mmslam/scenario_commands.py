@@ -76,8 +76,15 @@ def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:
 
 def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:
     with stdout_kept_clean():
-        from simulator.scene_export import exported_files
+        from simulator.scene_export import MOST_FROZEN, exported_files, frozen_facets
 
+        if (count := frozen_facets(scenario)) > MOST_FROZEN:
+            typer.echo(
+                f"its {count:.3g} facets are too many to write (limit {MOST_FROZEN:.3g}): the "
+                "smooth scene is exported alone; make objects smaller or less finely rough for "
+                "a frozen one",
+                err=True,
+            )
         written = []
         for name, content in exported_files(scenario, seed=seed):
             _write_new(folder / name, content)

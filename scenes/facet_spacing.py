@@ -102,6 +102,28 @@ def mesh_facet_count(area: float, faces: int, spacing: float) -> int:
     return faces + math.ceil(4 * area / spacing**2)
 
 
+def facet_counts(
+    objects: Mapping[str, Plate | Cylinder | Box | MeshFile],
+    shortest_wavelength: float,
+    *,
+    flat: bool = False,
+) -> dict[str, int]:
+    """Count the facets of whole objects, by name; parameters as in :func:`facet_problems`."""
+    counts: dict[str, int] = {}
+    for name, body in objects.items():
+        spacing = facet_spacing(body, shortest_wavelength)
+        if not isinstance(body, MeshFile):
+            counts[name] = facet_count(body, spacing)
+        elif flat:
+            counts[name] = _mesh_line_count(body, spacing)
+        else:
+            mesh = placed_mesh(body)
+            counts[name] = len(mesh.faces)
+            if body.facets == "cut":
+                counts[name] = mesh_facet_count(mesh.area, len(mesh.faces), spacing)
+    return counts
+
+
 def facet_problems(
     objects: Mapping[str, Plate | Cylinder | Box | MeshFile],
     shortest_wavelength: float,
@@ -124,19 +146,10 @@ def facet_problems(
     A line for each problem, with the keys, the values, the limit and the remedy.
     """
     found = []
-    counts: dict[str, int] = {}
     for name, body in objects.items():
-        spacing = facet_spacing(body, shortest_wavelength)
-        if isinstance(body, MeshFile):
-            mesh = placed_mesh(body)
-            counts[name] = len(mesh.faces)
-            if body.facets == "cut":
-                counts[name] = mesh_facet_count(mesh.area, len(mesh.faces), spacing)
-            if flat:
-                counts[name] = _mesh_line_count(body, spacing)
-        else:
-            counts[name] = facet_count(body, spacing)
+        if not isinstance(body, MeshFile):
             found += _roughness_problems(name, body)
+    counts = facet_counts(objects, shortest_wavelength, flat=flat)
     needed = sum(counts.values()) * BYTES_PER_FACET
     if needed > MOST_BYTES:
         name = max(counts, key=lambda key: counts[key])

@@ -29,7 +29,7 @@ from simulator.permittivity import (
 )
 from simulator.physical_optics import Pattern, Ports, isotropic
 from simulator.ray_scene import build_scene, facets_visible
-from simulator.rough_legs import diffuse_legs
+from simulator.rough_legs import diffuse_legs, may_reach
 from simulator.scene_mirrors import SceneMirrors, scene_mirrors
 from simulator.sights import array_sight, in_space, needed_reach, sending_sight
 
@@ -79,6 +79,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
                 one
                 for one in diffuse_legs(mirrors.mirrors, mirrors.chains)
                 if mirrors.owners[one.rough] == name
+                and may_reach(mirrors.mirrors, one, array_sight(scenario, elements))
             ]
             reach = needed_reach(scenario, elements, legs, rough)
         surface = object_surface(scenario, name, seed=seed, sample=sample, reach=reach)

@@ -4,7 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from simulator.mirrors import Mirrors
+from simulator.reach import Sight
 from simulator.specular_legs import DIRECT, Leg
+from simulator.specular_paths import within_reach
 
 DIFFUSE_LEVEL = 0.1
 """Product of two field patterns, over that of their peaks, that is left out: of the diffuse power
@@ -37,3 +39,11 @@ def diffuse_legs(mirrors: Mirrors, legs: Sequence[Leg]) -> Iterator[DiffuseLeg]:
                     before=DIRECT.onward(mirrors, *leg.sequence[:place]),
                     after=DIRECT.onward(mirrors, *leg.sequence[:place:-1]),
                 )
+
+
+def may_reach(mirrors: Mirrors, chain: DiffuseLeg, array: Sight) -> bool:
+    """Tell whether rays over the mirrors before it may meet the rough one at all."""
+    if not chain.before.sequence:
+        return True
+    images = chain.before.image(array).outline
+    return bool(within_reach(mirrors, chain.before.sequence, images)[chain.rough])

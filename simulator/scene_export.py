@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
 
+from scenes.facet_spacing import facet_counts
 from scenes.ply_file import ply_bytes
 from scenes.relocatable import relocatable
 from scenes.scenario import Scenario
@@ -22,11 +23,23 @@ from simulator.radio_scene import scenario_materials
 from simulator.ray_scene import HALF_HEIGHT
 from simulator.sionna_scene import material_colour
 
+MOST_FROZEN = 10_000_000
+"""Most facets of a realisation that is written: 600 MB of PLY. [-]"""
+
+
+def frozen_facets(scenario: Scenario) -> int:
+    """Count the facets of a scenario's frozen realisation: of whole surfaces, all around."""
+    wavelength = scenario.radio.shortest_wavelength
+    flat = scenario.dimensions == 2
+    return sum(facet_counts(scenario.objects, wavelength, flat=flat).values())
+
 
 def exported_files(
     scenario: Scenario, *, seed: int = 0, sample: int = 0
 ) -> Iterator[tuple[str, bytes]]:
     """Write a scenario's two scenes to memory, file after file.
+
+    The frozen one is left out if it has more than :data:`MOST_FROZEN` facets.
 
     Parameters
     ----------
@@ -45,7 +58,8 @@ def exported_files(
     ScenarioError
         If a material is not known over the band.
     """
-    for suffix in ("", "_facets"):
+    whole = frozen_facets(scenario) <= MOST_FROZEN
+    for suffix in ("", "_facets") if whole else ("",):
         frozen = bool(suffix)
         name = scenario.name + suffix
         yield f"{name}.xml", _scene_xml(scenario, f"{name}_meshes", frozen=frozen)
@@ -56,6 +70,8 @@ def exported_files(
         )
         for surface in surfaces:
             yield f"{name}_meshes/{surface.name}.ply", _ply(surface)
+    if not whole:
+        return
     moved = relocatable(scenario)
     toml = _facets_toml(scenario, moved.tables)
     yield f"{scenario.name}_facets.toml", toml.encode()

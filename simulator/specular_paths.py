@@ -197,12 +197,12 @@ def _sequences(
         if len(sequence) == max_bounces:
             continue
         latest = images[-1] if sequence else sources
-        for mirror in np.flatnonzero(_within_reach(mirrors, sequence, latest)).tolist():
+        for mirror in np.flatnonzero(within_reach(mirrors, sequence, latest)).tolist():
             image = mirrors.images(latest, mirror)
             stack.append(((*sequence, mirror), np.concatenate([images, image[None]])))
 
 
-def _within_reach(
+def within_reach(
     mirrors: Mirrors, sequence: tuple[int, ...], latest: Float[np.ndarray, "sources 3"]
 ) -> Bool[np.ndarray, " mirrors"]:
     """Tell which mirrors the beams from the latest images may meet next (none is missed)."""

@@ -10,7 +10,7 @@ from scenes.scenario import Scenario, parse_scenario
 from simulator.radio_materials import scattering_coefficient
 from simulator.radio_scene import radio_scene
 from simulator.ray_scene import facets_visible
-from simulator.scene_export import exported_files
+from simulator.scene_export import MOST_FROZEN, exported_files, frozen_facets
 from simulator.simulation import simulate
 
 
@@ -128,3 +128,11 @@ def test_a_scenario_without_objects_is_exported_too(tmp_path: Path) -> None:
     empty = load_scenario("slam_2d").model_copy(update={"objects": {}, "users": {}})
     exported(empty, tmp_path)
     assert load_scenario(str(tmp_path / "slam_2d_facets.toml")).objects == {}
+
+
+def test_a_realisation_of_too_many_facets_is_left_out_of_the_export() -> None:
+    scenario = load_scenario("room_3d")
+    assert frozen_facets(scenario) > MOST_FROZEN
+    names = [name for name, _ in exported_files(scenario)]
+    assert "room_3d.xml" in names
+    assert not any("facets" in name for name in names)

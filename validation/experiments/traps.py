@@ -126,13 +126,13 @@ TRAPS: dict[str, tuple[str, tuple[str, ...]]] = {
     # A corner
     "corner, in sight": (
         OPEN,
-        (*FACING, *wall(0.07, 0.47, 45.0, 0.19), *plate("second", 0.21, 0.47, -45.0, 0.19, coarser=True),
-         *user(0.2, 0.22)),
+        (*FACING, *wall(0.07, 0.47, 45.0, 0.19),
+         *plate("second", 0.21, 0.47, -45.0, 0.19, coarser=True), *user(0.2, 0.22)),
     ),
     "corner, over two walls": (
         BEAM,
-        (*FACING, *wall(0.07, 0.47, 45.0, 0.19), *plate("second", 0.21, 0.47, -45.0, 0.19, coarser=True),
-         *user(0.22, 0.15, "second")),
+        (*FACING, *wall(0.07, 0.47, 45.0, 0.19),
+         *plate("second", 0.21, 0.47, -45.0, 0.19, coarser=True), *user(0.22, 0.15, "second")),
     ),
     # A mirror seen edge-on
     "edge-on, before the array": (
@@ -160,13 +160,25 @@ TRAPS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "two walls, both sides": (
         OPEN,
-        (*HALF_SIZE, *COARSER, *wall(-0.2, 0.3, 70.0, 0.2), *plate("second", 0.2, 0.3, -70.0, 0.2, coarser=True),
-         *screen(0.02, 0.2, 0.0, 0.08), *user(0.03, 0.3)),
+        (*HALF_SIZE, *COARSER, *wall(-0.2, 0.3, 70.0, 0.2),
+         *plate("second", 0.2, 0.3, -70.0, 0.2, coarser=True), *screen(0.02, 0.2, 0.0, 0.08),
+         *user(0.03, 0.3)),
     ),
     # A user behind the mirror, and beside it
-    "behind, over another wall": (
+    "behind, over a wall too far": (
         BEAM,
-        (*HALF_SIZE, *COARSER, *plate("second", 0.3, 0.3, 90.0, 0.2, coarser=True), *user(0.05, 0.55, "second")),
+        (*HALF_SIZE, *COARSER, *plate("second", 0.3, 0.3, 90.0, 0.2, coarser=True),
+         *user(0.05, 0.55, "second")),
+    ),
+    "behind, over a wall in sight": (
+        BEAM,
+        (*FACING, *plate("second", 0.22, 0.38, 90.0, 0.16, coarser=True),
+         *user(-0.02, 0.8, "second")),
+    ),
+    "behind, over a wall too far aside": (
+        BEAM,
+        (*FACING, *plate("second", 0.3, 0.3, 90.0, 0.2, coarser=True),
+         *user(0.05, 0.55, "second")),
     ),
     "behind, past an end": (OPEN, (*HALF_SIZE, *user(0.14, 0.5))),
     "behind": (OPEN, (*HALF_SIZE, *user(-0.05, 0.5))),
