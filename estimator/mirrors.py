@@ -196,7 +196,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         for line in _best_of(_fitted(echo, looked, candidates, *focuses), coarse)
         if not _is_edge_on(line, half)
     ]
-    lines = _cut_where_they_cross(lines, *focuses, echo_resolution(echo))
+    lines = _cut_where_they_cross(lines, echo_resolution(echo), *focuses)
     in_sight = [line for line in lines if not _is_hidden(line, lines)]
     # Behind a mirror are clouds as well: there only what is seen, not scattered twice, counts.
     behind = np.array(
@@ -295,7 +295,7 @@ def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine
 
 
 def _cut_where_they_cross(
-    lines: Sequence[FittedLine], plain: Focus, tapered: Focus, resolution: Resolution
+    lines: Sequence[FittedLine], resolution: Resolution, plain: Focus, tapered: Focus
 ) -> list[FittedLine]:
     """Cut what lies behind another line off a line that crosses it.
 

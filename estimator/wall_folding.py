@@ -99,7 +99,7 @@ def _is_mixed(line: FittedLine, folded: FoldedWalls, resolution: Resolution) -> 
         if other is line or not chain:
             continue
         views = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
-        mixed = [between(points, *pair, resolution) for pair in zip(*views, strict=True)]
+        mixed = [between(points, seen, true, resolution) for seen, true in zip(*views, strict=True)]
         if np.mean(np.any(mixed, axis=0)) > 0.5:
             return True
     return False

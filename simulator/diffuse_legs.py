@@ -37,6 +37,10 @@ TRACED_SIDE = 0.02
 SAMPLE_SIDE = 0.04
 """Distance of places that tell whether anything at all is seen over several mirrors. [m]"""
 
+LEAST_PEAK = 0.3
+"""Product of two field patterns, over that of their peaks, that some place on a rough mirror needs
+for a chain over further mirrors to count: -10 dB. [-]"""
+
 MOST_SAMPLES = 50_000
 """Facets among which those places are chosen. [-]"""
 
@@ -195,7 +199,7 @@ def facets_within_reach(
 def _leads_there(
     scene: RadioScene, chain: DiffuseLeg, array: Sight, other: Sight, some: Int[np.ndarray, " some"]
 ) -> bool:
-    """Tell whether any place on the rough mirror is seen from both ends, by samples."""
+    """Tell whether both ends see a place on the rough mirror within their beams, by samples."""
     if scene.facets is None:
         return False
     if not chain.before.bounces and not chain.after.bounces:
@@ -208,7 +212,10 @@ def _leads_there(
         _traced(scene, chain, leg, sight, points).any(axis=0)
         for leg, sight in ((chain.after, other), (chain.before, corners))
     ]
-    return bool((seen[0] & seen[1]).any())
+    # The patterns' product there, over that of their peaks.
+    bright = chain.before.image(array).at_most(points, 0.0)
+    bright = bright * chain.after.image(other).at_most(points, 0.0)
+    return bool((seen[0] & seen[1] & (bright >= LEAST_PEAK)).any())
 
 
 def _traced(

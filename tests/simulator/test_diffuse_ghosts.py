@@ -32,6 +32,7 @@ def scene(
     seed: int = 0,
     size_m: tuple[float, float] = (0.6, 0.4),
     points: int = 21,
+    more: Any = None,
     **station: Any,
 ) -> tuple[Scenario, RadioScene]:
     """A can behind a screen, seen over a rough wall at 45° only."""
@@ -57,6 +58,7 @@ def scene(
                     "kind": "plate", "material": "absorber", "centre_m": [0.25, 0.4, 0.0],
                     "angle_deg": 100.0, "length_m": 0.6, "height_m": 0.5,
                 },
+                **(more or {}),
             },
         }
     )  # fmt: skip
@@ -126,6 +128,7 @@ def test_a_smooth_mirror_scatters_nothing_diffusely() -> None:
     assert 0 < np.linalg.norm(diffuse) < 0.02 * np.linalg.norm(coherent)
 
 
+@pytest.mark.slow
 def test_the_diffuse_part_has_no_mean_over_realisations() -> None:
     """A one-way wave's mean over seeds is zero, by a z-test in each real component."""
     waves = []
@@ -149,3 +152,25 @@ def test_transmitter_and_receiver_may_change_places() -> None:
     one, other = diffuse_echo(made, here, there), diffuse_echo(made, there, here)
     assert np.linalg.norm(one) > 0
     assert np.linalg.norm(one - other) <= RECIPROCITY * np.linalg.norm(one)
+
+
+def test_a_pilot_over_a_mirror_and_a_rough_wall_comes_from_the_users_image() -> None:
+    aside = {
+        "kind": "plate", "material": "metal", "centre_m": [1.0, 0.8, 0.0], "angle_deg": 45.0,
+        "length_m": 1.2, "height_m": 0.6,
+    }  # fmt: skip
+    options: Any = {"rms_mm": 1.0, "size_m": (0.2, 0.06), "antenna": {"kind": "isotropic"}}
+    _, both = scene(more={"aside": aside}, **options)
+    scenario, alone = scene(**options)
+    assert both.mirrors is not None
+    assert alone.mirrors is not None
+    array = array_sight(scenario, alone.elements)
+    user = Sight(positions=np.array([[1.0, 1.2, 0.12]]), pattern=ISOTROPIC)
+    image = Sight(positions=np.array([[1.4, 0.8, 0.12]]), pattern=ISOTROPIC)  # in y = x - 0.2
+    chains = diffuse_legs(both.mirrors.mirrors, both.mirrors.chains)
+    chain = next(one for one in chains if one.leg.sequence == (0, 1) and one.rough == 0)
+    (single,) = (one for one in diffuse_legs(alone.mirrors.mirrors, alone.mirrors.legs[:1]))
+    found = diffuse_wave(both, chain, array, user)
+    expected = -diffuse_wave(alone, single, array, image)  # a conductor turns the field round
+    assert np.linalg.norm(expected) > 0
+    assert np.linalg.norm(found - expected) <= 1e-3 * np.linalg.norm(expected)

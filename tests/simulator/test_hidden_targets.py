@@ -10,7 +10,7 @@ from scipy.constants import speed_of_light
 
 from scenes.scenario import Scenario, parse_scenario
 from simulator.antenna_pattern import ISOTROPIC
-from simulator.hidden_targets import echo_over_mirrors
+from simulator.hidden_targets import coherent_echo, echo_over_mirrors
 from simulator.materials import Conductor
 from simulator.patch_kernel import Links
 from simulator.patch_sum import Seen, scattered_by_patches
@@ -101,7 +101,7 @@ def test_a_target_hidden_behind_a_screen_echoes_as_its_image_does() -> None:
 def test_a_rough_mirror_loses_its_coherent_part_once_each_way() -> None:
     scenario, made = scene(rms_mm=0.6)
     array = array_sight(scenario, made.elements)
-    ghost = echo_over_mirrors(made, array, array)
+    ghost = coherent_echo(made, array, array)
     wavenumbers = 2 * np.pi * scenario.radio.frequencies / speed_of_light
     loss = roughness_loss(wavenumbers * 0.6e-3 * np.cos(np.pi / 4))
     # The can's 4 cm seen from 1.4 m: angles of incidence within 2° of 45°, 2 (k rms)² sin 90° 2°.

@@ -274,7 +274,7 @@ def test_leaving_out_mirrors_beyond_the_beams_loses_no_path(
         ]
 
     pruned = all_links()
-    monkeypatch.setattr(specular_paths, "_within_reach", everything)
+    monkeypatch.setattr(specular_paths, "within_reach", everything)
     assert all_links() == pruned
     assert sum(len(sequence) > 1 for links in pruned for _, _, sequence in links) > 10
 

@@ -141,7 +141,7 @@ TRAPS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "edge-on, at the side": (
         OPEN,
-        (*HALF_SIZE, *wall(0.18, 0.27, 56.3, 0.15), *user(0.1, 0.42)),
+        (*HALF_SIZE, *wall(0.18, 0.27, 56.3, 0.15), *user(0.09, 0.4)),
     ),
     "edge-on, hides the user": (
         BEAM,
@@ -180,7 +180,7 @@ TRAPS: dict[str, tuple[str, tuple[str, ...]]] = {
         (*FACING, *plate("second", 0.3, 0.3, 90.0, 0.2, coarser=True),
          *user(0.05, 0.55, "second")),
     ),
-    "behind, past an end": (OPEN, (*HALF_SIZE, *user(0.14, 0.5))),
+    "behind, past an end": (OPEN, (*FARTHER, *user(0.14, 0.5))),
     "behind": (OPEN, (*HALF_SIZE, *user(-0.05, 0.5))),
     "in sight beside it": (OPEN, (*HALF_SIZE, *user(0.1, 0.2))),
     "in sight and over it": (OPEN, (*HALF_SIZE, *user(0.25, 0.37))),
