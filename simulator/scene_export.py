@@ -3,7 +3,8 @@
 Two scenes are written. ``NAME.xml`` holds the smooth mean surfaces, their roughness in the
 scattering coefficients: it is for Sionna's own solvers. ``NAME_facets.xml`` holds one frozen
 realisation, every facet as it is simulated, and no scattering coefficient: ``NAME_facets.toml``
-is the scenario of it, and simulates the same.
+is the scenario of it, and simulates the same; in three dimensions with a single bounce: chains
+over several surfaces need the mean planes of walls, which frozen facets do not tell.
 """
 
 from collections.abc import Iterator

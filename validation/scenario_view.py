@@ -17,6 +17,9 @@ from validation.scenario_plan import DIELECTRIC, MATERIAL_COLOURS, TRANSMITTER, 
 STRIP_HEIGHT = 0.12
 """Height of the strips that stand for the lines of a 2-D scene, over the scene's size [-]."""
 
+SHELL = 0.4
+"""Size of a surface, over the scene's, from which it may hide the others. [-]"""
+
 MOST_FACES = 20_000
 """Faces drawn of one object; of a finer mesh, evenly chosen ones."""
 
@@ -54,10 +57,11 @@ def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()
         material = scenario.objects[surface.name].material
         colour = MATERIAL_COLOURS.get(str(material), DIELECTRIC)
         edges = to_rgba(colour, 0.9 if len(corners) <= 200 else 0.15)
+        # What encloses the others is drawn as outlines, nearly.
+        shell = float(np.ptp(surface.vertices, axis=0).max()) > SHELL * size
+        face = to_rgba(colour, 0.04 if shell and scenario.dimensions == 3 else 0.28)
         ax.add_collection3d(
-            Poly3DCollection(
-                corners[::step], facecolors=to_rgba(colour, 0.28), edgecolors=edges, linewidths=0.5
-            )
+            Poly3DCollection(corners[::step], facecolors=face, edgecolors=edges, linewidths=0.5)
         )
         middle = surface.vertices.mean(axis=0)
         middle[2] += strip / 2 if scenario.dimensions == 2 else 0.0
