@@ -31,10 +31,7 @@ from scipy.ndimage import map_coordinates, maximum_filter1d
 
 from estimator.measurement import Uplink
 from estimator.projection import Wall
-from estimator.windows import Window, aperture_taper, frequency_taper
-
-TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
-"""Over the aperture and the band: a bright point must not light the whole wall."""
+from estimator.windows import survey_weights
 
 SIDELOBES = 10**-4.5
 """Intensity, over the largest one, that sidelobes of the taper may have near the main lobe. [-]"""
@@ -166,7 +163,8 @@ def further_distances(
     frequencies = uplink.frequencies
     count = frequencies.size
     step = float(frequencies[-1] - frequencies[0]) / (count - 1)
-    taper = np.outer(aperture_taper(uplink.positions, TAPER), frequency_taper(frequencies, TAPER))
+    # A low-sidelobe taper: a bright point must not light the whole wall.
+    taper = survey_weights(uplink)
     # Phases over a uniform grid are products of a few: n = inner · a + b.
     inner = int(np.ceil(np.sqrt(count)))
     padded = np.zeros((len(uplink.positions), inner * inner), dtype=np.complex128)

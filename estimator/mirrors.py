@@ -15,10 +15,7 @@ from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 from estimator.resolution import HALF_POWER, unaliased_sine
 from estimator.wavefront_bend import bent_intensities, coherence
-from estimator.windows import Window, aperture_taper, frequency_taper
-
-TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
-"""The survey's; its sidelobes are below :data:`estimator.line_search.DYNAMIC_RANGE`."""
+from estimator.windows import SURVEY_TAPER, frequency_taper, survey_weights
 
 REFLECTED = 0.5
 """Coherence, as that of a mirror facing the array, of what does reflect it. [-]"""
@@ -117,13 +114,13 @@ def survey(echo: Echo) -> Survey:
     points = np.zeros((ranges.size, count, 3))
     points[..., 0] = ranges[:, None] * sines
     points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
-    values = backproject(echo, points, weights=_taper_weights(echo))
+    taper = survey_weights(echo)
+    values = backproject(echo, points, weights=taper)
     peaks = significant_peaks(np.abs(values) ** 2, points)
     tried = bent_intensities(range_profiles(echo), peaks, resolution)
-    taper = _taper_weights(echo)
     # What the noise in the image is before the sum over the positions.
     noise = float(np.median(np.abs(values) ** 2)) / np.log(2) * taper.sum() ** 2 / (taper**2).sum()
-    across = frequency_taper(echo.frequencies, TAPER)
+    across = frequency_taper(echo.frequencies, SURVEY_TAPER)
     profiles = range_profiles(echo, weights=across[None, :])
     by_shape = [
         coherence(profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum()))
@@ -158,10 +155,6 @@ def _faces(
     return belongs
 
 
-def _taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
-    return np.outer(aperture_taper(echo.positions, TAPER), frequency_taper(echo.frequencies, TAPER))
-
-
 def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     """Find the walls that the image shows; the strongest first.
 
@@ -188,7 +181,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     farthest = echo_reach(echo)[1]
     focuses = tuple(
         focus_within(prepare(range_profiles(echo, weights=weights)), farthest)
-        for weights in (None, _taper_weights(echo))
+        for weights in (None, survey_weights(echo))
     )
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
     lines = [
@@ -366,7 +359,7 @@ def loose_peaks(
 
 def coarse_resolution(fine: Resolution) -> Resolution:
     """Return the resolution of the survey, which its taper widens."""
-    wider = TAPER.half_power_width / HALF_POWER
+    wider = SURVEY_TAPER.half_power_width / HALF_POWER
     return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
 
 

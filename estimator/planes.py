@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from estimator.backprojection import prepare
 from estimator.line_search import Resolution
 from estimator.measurement import Echo
-from estimator.mirrors import focus_within
+from estimator.mirrors import coarse_resolution, focus_within
 from estimator.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.plane_fit import (
     FittedPlane,
@@ -29,8 +29,7 @@ from estimator.plane_search import find_planes
 from estimator.projection_3d import PlaneWall, within
 from estimator.range_gate import gated
 from estimator.range_profiles import range_profiles
-from estimator.resolution import HALF_POWER
-from estimator.volume_survey import TAPER, VolumeSurvey, lobe_origins
+from estimator.volume_survey import VolumeSurvey, lobe_origins
 from estimator.wavefront_fit import Wavefront, fit_wavefront
 from estimator.wavefront_search import search_wavefront
 
@@ -59,12 +58,6 @@ class Planes:
     head_on: tuple[bool, ...]  # whether the wall's own flat wave was seen
 
 
-def coarse_resolution(array: PlanarArray, echo: Echo) -> Resolution:
-    """Return the resolution of the survey, which its taper widens."""
-    fine, wider = planar_resolution(array, echo), TAPER.half_power_width / HALF_POWER
-    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
-
-
 def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Planes:
     """Find the plane walls in an echo.
 
@@ -81,7 +74,8 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
     -------
     Walls whose confidence is at least :data:`LEAST_CONFIDENCE`.
     """
-    fine, coarse = planar_resolution(array, echo), coarse_resolution(array, echo)
+    fine = planar_resolution(array, echo)
+    coarse = coarse_resolution(fine)
     reach = planar_reach(array, echo, passes=2)
     sharp = focus_within(prepare(range_profiles(echo)), reach[1])
     found: list[FittedPlane] = []
@@ -147,7 +141,7 @@ def lobe_of_a_wall(
     strongest = np.argsort(-intensity, kind="stable")[:MOST_VOXELS]
     origins, real = lobe_origins(echo, array, points[strongest])
     flat = origins.reshape(-1, 3)
-    resolution = coarse_resolution(array, echo)
+    resolution = coarse_resolution(planar_resolution(array, echo))
     on_wall = np.zeros(real.shape, dtype=bool)
     for wall in planes:
         beside = np.abs((flat - wall.centre) @ wall.normal)

@@ -10,9 +10,10 @@ from scipy.spatial import cKDTree
 
 from estimator.line_search import FALSE_ALARM, Resolution
 from estimator.measurement import Echo
-from estimator.planar_array import PlanarArray
+from estimator.mirrors import coarse_resolution
+from estimator.planar_array import PlanarArray, planar_resolution
 from estimator.plane_fit import FittedPlane, plane_axes, towards_array
-from estimator.planes import coarse_resolution, detect_planes, lobe_of_a_wall
+from estimator.planes import detect_planes, lobe_of_a_wall
 from estimator.projection_3d import PlaneWall, hidden_by, mirrored_about
 from estimator.volume_survey import VolumeSurvey, survey_volume
 
@@ -66,7 +67,7 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
         Its extents.
     """
     looked = survey_volume(echo, array)
-    coarse = coarse_resolution(array, echo)
+    coarse = coarse_resolution(planar_resolution(array, echo))
     planes, walls, seen = _folded(detect_planes(echo, array, looked).fitted, coarse)
     direct = [wall for wall, through in zip(walls, seen, strict=True) if not through]
     return SpaceMap(
@@ -193,7 +194,7 @@ def _targets(
     direct: Sequence[PlaneWall],
 ) -> tuple[SpaceTarget, ...]:
     """Gather the bright voxels off the walls into clusters and fold those behind walls."""
-    resolution = coarse_resolution(array, echo)
+    resolution = coarse_resolution(planar_resolution(array, echo))
     intensity = np.abs(looked.values) ** 2
     ranges, along, up = np.meshgrid(looked.ranges, looked.along, looked.up, indexing="ij")
     ahead = np.sqrt(np.maximum(1 - along**2 - up**2, 0.0))

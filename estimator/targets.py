@@ -12,10 +12,11 @@ from estimator.estimate import Target
 from estimator.line_search import Resolution
 from estimator.mirror_chains import image_over, possible_chains, seen_over, unfolded
 from estimator.mirror_fit import FittedLine
-from estimator.mirrors import TAPER, Survey, coarse_resolution, lies_on
+from estimator.mirrors import Survey, coarse_resolution, lies_on
 from estimator.projection import Wall, crossing, mirrored
 from estimator.resolution import HALF_POWER
 from estimator.wall_folding import FoldedWalls, place_covariance
+from estimator.windows import SURVEY_TAPER
 
 LEAST_COHERENCE = 0.3
 """Of a target over the aperture: with a cloud as strong as itself in its own range it has 0.5;
@@ -259,7 +260,7 @@ def _cloud_bend(
     hits = [crossing(np.zeros(3), place / reach, door.start, door.end) for door in doors]
     farthest = max((hit[0] for hit in hits if hit is not None), default=reach)
     # k h² with the half aperture h, of the cell λ/2D that the survey's taper widens.
-    scale = np.pi * aperture / (4 * coarse.across_ray) * TAPER.half_power_width / HALF_POWER
+    scale = np.pi * aperture / (4 * coarse.across_ray) * SURVEY_TAPER.half_power_width / HALF_POWER
     cosine = place[1] / reach
     return float(scale * cosine**2 * 0.5 * (1 / farthest - 1 / reach))
 

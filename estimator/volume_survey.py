@@ -17,10 +17,7 @@ from estimator.backprojection import backproject
 from estimator.line_search import DYNAMIC_RANGE, FALSE_ALARM
 from estimator.measurement import Echo
 from estimator.planar_array import PlanarArray, planar_reach, planar_resolution
-from estimator.windows import Window, aperture_taper, frequency_taper
-
-TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
-"""Its sidelobes are below :data:`estimator.line_search.DYNAMIC_RANGE`."""
+from estimator.windows import survey_weights
 
 STEP = 0.75
 """Spacing of the grid, over the untapered cell: 0.44 of the tapered one. [-]"""
@@ -106,7 +103,7 @@ def survey_volume(echo: Echo, array: PlanarArray) -> VolumeSurvey:
     points[..., 1] = ranges[:, None, None] * np.sqrt(ahead)
     values = np.zeros(points.shape[:-1], dtype=np.complex128)
     seen = np.broadcast_to(ahead > 0.05, values.shape)
-    values[seen] = backproject(echo, points[seen], weights=taper_weights(echo))
+    values[seen] = backproject(echo, points[seen], weights=survey_weights(echo))
     carrier = 4 * np.pi * float(echo.frequencies.mean()) / speed_of_light
     values *= np.exp(-1j * carrier * ranges)[:, None, None]
     intensity = np.abs(values) ** 2
@@ -154,14 +151,9 @@ def brighter_elsewhere(
     if not real.any():
         return np.zeros(len(peaks), dtype=bool)
     there = np.zeros(real.shape)
-    there[real] = np.abs(backproject(echo, points[real], weights=taper_weights(echo))) ** 2
+    there[real] = np.abs(backproject(echo, points[real], weights=survey_weights(echo))) ** 2
     lobes: np.ndarray = there.max(axis=1) > LOBE * levels
     return lobes
-
-
-def taper_weights(echo: Echo) -> Float[np.ndarray, "positions freqs"]:
-    """Return the low-sidelobe taper over array and band."""
-    return np.outer(aperture_taper(echo.positions, TAPER), frequency_taper(echo.frequencies, TAPER))
 
 
 def lobe_origins(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 from scipy.special import i0
 
-from estimator.measurement import MeasurementError
+from estimator.measurement import Echo, MeasurementError, Uplink
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)  # ample for 20 cycles
 
@@ -148,3 +148,14 @@ def _taylor(
         values = values + 2 * factor * np.cos(2 * np.pi * m * coordinate)
         middle += 2 * factor
     return np.asarray(values / middle)
+
+
+SURVEY_TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
+"""Over the aperture and the band where everything is looked at: its sidelobes are below
+:data:`estimator.line_search.DYNAMIC_RANGE`."""
+
+
+def survey_weights(measured: Echo | Uplink) -> Float[np.ndarray, "positions freqs"]:
+    """Return :data:`SURVEY_TAPER` over aperture and band. [-]."""
+    taper = aperture_taper(measured.positions, SURVEY_TAPER)
+    return np.outer(taper, frequency_taper(measured.frequencies, SURVEY_TAPER))
