@@ -110,8 +110,8 @@ def facet_counts(
 ) -> dict[str, int]:
     """Count the facets of whole objects, by name; parameters as in :func:`facet_problems`."""
     counts: dict[str, int] = {}
-    for name, body in objects.items():
-        spacing = facet_spacing(body, shortest_wavelength)
+    for name, drawn in objects.items():
+        spacing, body = facet_spacing(drawn, shortest_wavelength), drawn.frozen or drawn
         if not isinstance(body, MeshFile):
             counts[name] = facet_count(body, spacing)
         elif flat:

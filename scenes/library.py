@@ -1,7 +1,9 @@
 """The library of scenarios, and scenarios from files, with overrides by dotted path."""
 
+import copy
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -28,6 +30,38 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(n.removesuffix(".toml") for n in entries if n.endswith(".toml")))
 
 
+@dataclass(frozen=True, kw_only=True)
+class ScenarioSource:
+    """A scenario's tables as they were read, from which variants of it are made."""
+
+    origin: str  # the name or the path that was asked for
+    tables: Mapping[str, Any]  # as the file holds them, nothing checked
+    folder: Path  # that paths of meshes and tables are relative to
+
+    def variant(self, change: Callable[[dict[str, Any]], None] | None = None) -> Scenario:
+        """Return the scenario, or what it becomes when its tables are changed.
+
+        Parameters
+        ----------
+        change
+            Changes a copy of the tables in place; None: nothing is changed.
+
+        Raises
+        ------
+        ScenarioError
+            If the variant is impossible.
+        """
+        return parse_scenario(self.changed(change))
+
+    def changed(self, change: Callable[[dict[str, Any]], None] | None = None) -> dict[str, Any]:
+        """Return a changed copy of the tables, with absolute paths, nothing checked."""
+        tables: dict[str, Any] = copy.deepcopy(dict(self.tables))
+        if change is not None:
+            change(tables)
+        _resolve_files(tables, self.folder)
+        return tables
+
+
 def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     """Load a scenario of the library, or from a TOML file.
 
@@ -48,6 +82,24 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
         If there is no such scenario, the file cannot be read, or the scenario is impossible;
         each line names file, key, value, limit and remedy.
     """
+    source = scenario_source(name_or_path)
+    try:
+        return source.variant(lambda tables: _override(tables, overrides))
+    except ScenarioError as error:
+        if str(error).startswith("--set "):
+            raise
+        lines = [f"{name_or_path}: {line}" for line in str(error).splitlines()]
+        raise ScenarioError("\n".join(lines)) from None
+
+
+def scenario_source(name_or_path: str) -> ScenarioSource:
+    """Read a scenario's tables, as :func:`load_scenario` does, and check nothing yet.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, or its file cannot be read.
+    """
     source: Traversable
     if name_or_path in scenario_names():
         source, folder = _folder() / f"{name_or_path}.toml", Path(str(_folder()))
@@ -61,13 +113,31 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
         )
     data = _tables(source, name_or_path)
     data.setdefault("name", source.name.removesuffix(".toml"))
-    _override(data, overrides)
-    _resolve_files(data, folder)
-    try:
-        return parse_scenario(data)
-    except ScenarioError as error:
-        lines = [f"{name_or_path}: {line}" for line in str(error).splitlines()]
-        raise ScenarioError("\n".join(lines)) from None
+    return ScenarioSource(origin=name_or_path, tables=data, folder=folder)
+
+
+def set_keys(data: dict[str, Any], values: Mapping[str, object], *, by: str = "--set ") -> None:
+    """Set keys of a scenario's tables by their dotted paths, in turn, in place.
+
+    Parameters
+    ----------
+    data
+        The tables. A missing table is made.
+    values
+        Value by dotted key.
+    by
+        What asks for it, for messages.
+
+    Raises
+    ------
+    ScenarioError
+        If a key leads through a value, or begins an object, a user or a point without what it
+        cannot do without.
+    """
+    known = {group: set(_group(data, group)) for group in _BEGIN}
+    for key, value in values.items():
+        _set(key, value, data, shown_as=f"{by}{key!r}")
+    _refuse_new_names(data, known, by)
 
 
 def override_scenario(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
@@ -134,12 +204,22 @@ def _tables(source: Traversable, shown_name: str) -> dict[str, Any]:
 def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
     known = {group: set(_group(data, group)) for group in _BEGIN}
     for override in overrides:
-        _apply(override, data)
+        key, separator, text = override.partition("=")
+        if not separator or not all(part.strip() for part in key.split(".")):
+            raise ScenarioError(
+                f"--set {override!r}: must be KEY=VALUE with a dotted KEY, such as "
+                "objects.wall.angle_deg=35"
+            )
+        _set(key, _literal(text.strip()), data, shown_as=f"--set {override!r}")
+    _refuse_new_names(data, known, "--set ")
+
+
+def _refuse_new_names(data: dict[str, Any], known: Mapping[str, set[str]], by: str) -> None:
     for group, needed in _BEGIN.items():
         for name, table in _group(data, group).items():
             if name not in known[group] and isinstance(table, dict) and needed not in table:
                 raise ScenarioError(
-                    f"--set {group}.{name}: no such name{did_you_mean(name, known[group])}; known: "
+                    f"{by}{group}.{name}: no such name{did_you_mean(name, known[group])}; known: "
                     f"{', '.join(sorted(known[group])) or 'none'}; to add one, set "
                     f"{group}.{name}.{needed} as well"
                 )
@@ -150,24 +230,18 @@ def _group(data: Mapping[str, Any], group: str) -> dict[str, Any]:
     return tables if isinstance(tables, dict) else {}
 
 
-def _apply(override: str, data: dict[str, Any]) -> None:
-    key, separator, text = override.partition("=")
+def _set(key: str, value: object, data: dict[str, Any], *, shown_as: str) -> None:
     path = [part.strip() for part in key.split(".")]
-    if not separator or not all(path):
-        raise ScenarioError(
-            f"--set {override!r}: must be KEY=VALUE with a dotted KEY, such as "
-            "objects.wall.angle_deg=35"
-        )
     table = data
     for depth, part in enumerate(path[:-1]):
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
             parent = ".".join(path[: depth + 1])
             raise ScenarioError(
-                f"--set {override!r}: {parent} = {shown(table)} is a value, not a table; set "
+                f"{shown_as}: {parent} = {shown(table)} is a value, not a table; set "
                 f"{parent} itself"
             )
-    table[path[-1]] = _literal(text.strip())
+    table[path[-1]] = value
 
 
 def _literal(text: str) -> object:
@@ -190,8 +264,11 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
     for body in bodies:
         tables = [body, body.get("material")] if isinstance(body, dict) else []
         for table in tables:
-            if isinstance(table, dict) and isinstance(table.get("file"), str) and table["file"]:
-                table["file"] = str((folder / table["file"]).resolve())
+            if not isinstance(table, dict):
+                continue
+            for key in ("file", "realisation"):
+                if isinstance(table.get(key), str) and table[key]:
+                    table[key] = str((folder / table[key]).resolve())
 
 
 def _is_position(value: Any) -> bool:

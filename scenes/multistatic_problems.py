@@ -61,6 +61,13 @@ def multistatic_problems(
         "the user, or give base_station.elements without receivers and transmitter"
         for name in users
     ]
+    found += [
+        f"objects.{name}.realisation: the heights of plates are drawn tile by tile where antennas "
+        "stand apart, and not read; remove it, or give the surface as an object of kind = 'mesh' "
+        "with facets = 'file'"
+        for name, body in objects.items()
+        if isinstance(body, Plate) and body.realisation is not None
+    ]
     antennas = {}
     if station.receivers is not None:
         antennas["base_station.receivers"] = station.element_positions

@@ -83,6 +83,12 @@ class Body(Checked):
     roughness: Roughness | None = Field(
         None, description="the roughness of its surface; without, what its material has by itself"
     )
+    realisation: str | None = Field(
+        None,
+        min_length=1,
+        description="a mesh file of its surface with all heights, drawn or measured, in the "
+        "scene's frame, relative to the scenario's file; without, heights are drawn",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -99,6 +105,21 @@ class Body(Checked):
                 "absorber", "an absorber scatters nothing, rough or smooth; remove 'roughness'"
             )
         return self
+
+    @property
+    def frozen(self) -> "MeshFile | None":
+        """The mesh of its realisation, facets as they are; none if heights are to be drawn."""
+        if self.realisation is None:
+            return None
+        smooth = Roughness(rms_mm=0.0, correlation_mm=1.0)
+        return MeshFile(
+            kind="mesh",
+            material=self.material,
+            file=self.realisation,
+            facets="file",
+            hollow=isinstance(self, MeshFile) and self.hollow,
+            roughness=None if self.material == "absorber" else smooth,
+        )
 
     @property
     def centre(self) -> Float[np.ndarray, " 3"]:

@@ -39,11 +39,13 @@ def relocatable(scenario: Scenario) -> Relocatable:
     places: dict[Path, str] = {}
     for body in tables.get("objects", {}).values():
         for table in (body, body["material"]):
-            if isinstance(table, dict) and "file" in table:
-                source = Path(table["file"]).resolve()
+            if not isinstance(table, dict):
+                continue
+            for key in [key for key in ("file", "realisation") if key in table]:
+                source = Path(table[key]).resolve()
                 if source not in places:
                     places[source] = _free(f"{scenario.name}_files", source, places.values())
-                table["file"] = places[source]
+                table[key] = places[source]
     return Relocatable(tables=tables, files={place: source for source, place in places.items()})
 
 

@@ -4,7 +4,6 @@ Keys carry their units (GHz, mm, m, degree, dB); the properties are SI and radia
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -16,15 +15,14 @@ from scenes.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotr
 from scenes.base_station import BaseStation
 from scenes.directions import unit_vector
 from scenes.facet_spacing import facet_problems, facet_spacing
+from scenes.file_problems import file_problems
 from scenes.geometry import with_geometry
 from scenes.impairments import Impairments
 from scenes.materials import MATERIALS, Slab
 from scenes.mesh_file import placed_mesh
-from scenes.mesh_lines import mesh_segments
 from scenes.multistatic import Arc, Places, Transmitter
 from scenes.multistatic_problems import antenna_places, multistatic_problems
 from scenes.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
-from scenes.permittivity_table import band_problem, read_permittivity_table
 from scenes.placement import inconsistencies
 from scenes.point_target import PointTarget
 from scenes.quantities import Checked, Name, Position
@@ -121,7 +119,9 @@ class Scenario(Checked):
     def _possible(self) -> "Scenario":
         # In this order: each step relies on what those before have found sound.
         found = _dimension_problems(self) + _sample_problems(self)
-        found = found or _mesh_problems(self) + _table_problems(self)
+        found = found or file_problems(
+            self.objects, self.radio.frequencies, flat=self.dimensions == 2
+        )
         found = found or [
             *_aim_problems(self),
             *_point_problems(self),
@@ -313,36 +313,6 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
             for key, point in points.items()
             if point[2] != 0
         ]
-    return found
-
-
-def _mesh_problems(scenario: Scenario) -> list[str]:
-    found = []
-    for name, body in scenario.objects.items():
-        if isinstance(body, MeshFile):
-            try:
-                placed_mesh(body)
-                if scenario.dimensions == 2:
-                    mesh_segments(body)
-            except ScenarioError as error:
-                found.append(f"objects.{name}.file: {error}")
-    return found
-
-
-def _table_problems(scenario: Scenario) -> list[str]:
-    found = []
-    for name, body in scenario.objects.items():
-        if not isinstance(body.material, Slab) or body.material.file is None:
-            continue
-        path = Path(body.material.file)
-        try:
-            table = read_permittivity_table(path)
-        except ScenarioError as error:
-            found.append(f"objects.{name}.material.file: {error}")
-            continue
-        lowest, highest = float(table.frequencies[0]), float(table.frequencies[-1])
-        if problem := band_problem(scenario.radio.frequencies, lowest, highest):
-            found.append(f"objects.{name}.material.file: {path} {problem}")
     return found
 
 

@@ -84,6 +84,8 @@ def object_surface(
     if not spacing > 0:
         raise ValueError(f"spacing = {spacing} m must be positive; give a length")
     heights = Heights(body.roughness, random_stream(seed, sample, f"roughness/{name}"))
+    if body.frozen is not None:
+        body, heights = body.frozen, Heights(None, random_stream(seed, sample, "none"))
     if isinstance(body, MeshFile):
         if scenario.dimensions == 2:
             from scenes.mesh_lines import lines_are_closed, mesh_lines

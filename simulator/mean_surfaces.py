@@ -20,7 +20,7 @@ def mean_surfaces(scenario: Scenario) -> list[Surface]:
     smooth = scenario.model_copy(
         update={
             "objects": {
-                name: body.model_copy(update={"roughness": None})
+                name: body.model_copy(update={"roughness": None, "realisation": None})
                 for name, body in scenario.objects.items()
             }
         }

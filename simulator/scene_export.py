@@ -3,12 +3,12 @@
 Two scenes are written. ``NAME.xml`` holds the smooth mean surfaces, their roughness in the
 scattering coefficients: it is for Sionna's own solvers. ``NAME_facets.xml`` holds one frozen
 realisation, every facet as it is simulated, and no scattering coefficient: ``NAME_facets.toml``
-is the scenario of it, and simulates the same; in three dimensions with a single bounce: chains
-over several surfaces need the mean planes of walls, which frozen facets do not tell.
+is the scenario of it, and simulates the same. Its objects keep their smooth shapes and the
+statistics of their roughness, which mirrors and chains of them need, and take their facets from
+the meshes of the frozen scene.
 """
 
 from collections.abc import Iterator
-from typing import Any
 from xml.etree import ElementTree
 
 from scenes.facet_spacing import facet_counts
@@ -73,12 +73,20 @@ def exported_files(
             yield f"{name}_meshes/{surface.name}.ply", _ply(surface)
     if not whole:
         return
-    moved = relocatable(scenario)
-    toml = _facets_toml(scenario, moved.tables)
-    yield f"{scenario.name}_facets.toml", toml.encode()
+    moved = relocatable(_drawn(scenario))
+    tables = moved.tables
+    tables["name"] = f"{scenario.name}_facets"
+    for name, body in tables.get("objects", {}).items():
+        body["realisation"] = f"{scenario.name}_facets_meshes/{name}.ply"
+    yield f"{scenario.name}_facets.toml", toml_text(tables).encode()
     for name, source in moved.files.items():
-        if f'"{name}"' in toml:  # tables of permittivity, not the meshes that were cut
-            yield name, source.read_bytes()
+        yield name, source.read_bytes()
+
+
+def _drawn(scenario: Scenario) -> Scenario:
+    """Return the scenario without realisations that it may have been loaded with."""
+    bodies = {n: b.model_copy(update={"realisation": None}) for n, b in scenario.objects.items()}
+    return scenario.model_copy(update={"objects": bodies})
 
 
 def _ply(surface: Surface) -> bytes:
@@ -111,22 +119,3 @@ def _scene_xml(scenario: Scenario, folder: str, *, frozen: bool) -> bytes:
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
-
-
-def _facets_toml(scenario: Scenario, data: dict[str, Any]) -> str:
-    bodies = data.pop("objects", {})
-    if bodies:
-        data["geometry"] = {
-            "file": f"{scenario.name}_facets.xml",
-            "facets": "file",
-            "objects": {name: {"material": body["material"]} for name, body in bodies.items()},
-        }
-    data["name"] = f"{scenario.name}_facets"
-    station = data["base_station"]
-    for holder in (station, station.get("transmitter", {}), *data.get("users", {}).values()):
-        antenna = holder.get("antenna", {})
-        if "aim" in antenna:
-            # A mesh's centre is that of its bounding box, a few micrometres off.
-            centre = scenario.object_centre(antenna.pop("aim")).tolist()
-            antenna["aim_m"] = centre[: scenario.dimensions]
-    return toml_text(data)

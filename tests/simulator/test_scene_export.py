@@ -6,7 +6,9 @@ import pytest
 import sionna.rt as rt
 
 from scenes.library import load_scenario
-from scenes.scenario import Scenario, parse_scenario
+from scenes.ply_file import ply_bytes
+from scenes.scenario import Scenario, ScenarioError, parse_scenario
+from simulator.mean_surfaces import mean_surfaces
 from simulator.radio_materials import scattering_coefficient
 from simulator.radio_scene import radio_scene
 from simulator.ray_scene import facets_visible
@@ -29,9 +31,8 @@ def solid() -> Scenario:
     rough = {"rms_mm": 0.1, "correlation_mm": 2.0}
     return parse_scenario(
         {
-            # Frozen facets do not tell the mean plane, which chains of mirrors need.
-            "name": "solid", "dimensions": 3, "max_bounces": 1,
-            "radio": {"start_ghz": 20.0, "stop_ghz": 30.0, "points": 11},
+            "name": "solid", "dimensions": 3, "max_bounces": 2,
+            "radio": {"start_ghz": 20.0, "stop_ghz": 30.0, "points": 5},
             "base_station": {"elements": [2, 2], "spacing_mm": 5.0},
             "objects": {
                 "wall": {
@@ -137,3 +138,30 @@ def test_a_realisation_of_too_many_facets_is_left_out_of_the_export() -> None:
     names = [name for name, _ in exported_files(scenario)]
     assert "room_3d.xml" in names
     assert not any("facets" in name for name in names)
+
+
+def test_a_realisation_must_lie_where_its_object_is(tmp_path: Path) -> None:
+    scenario = small_slam_2d()
+    exported(scenario, tmp_path)
+    file = str(tmp_path / "slam_2d_facets.toml")
+    with pytest.raises(ScenarioError, match=r"objects\.wall\.realisation: the extents of .* off"):
+        load_scenario(file, ["objects.wall.angle_deg=46"])
+    with pytest.raises(ScenarioError, match=r"objects\.wall\.realisation: .* No such file"):
+        load_scenario(file, ["objects.wall.realisation=none.ply"])
+
+
+def test_a_frozen_realisation_is_the_same_for_every_seed(tmp_path: Path) -> None:
+    exported(small_slam_2d(), tmp_path, seed=3)
+    again = load_scenario(str(tmp_path / "slam_2d_facets.toml"))
+    one, other = (radio_scene(again, seed=seed, sample=0).facets for seed in (0, 1))
+    assert one is not None
+    assert other is not None
+    np.testing.assert_array_equal(one.centres, other.centres)
+
+
+def test_where_antennas_stand_apart_a_plate_takes_no_realisation(tmp_path: Path) -> None:
+    file = tmp_path / "sample.ply"
+    sample = mean_surfaces(load_scenario("rcs_drywall"))[0]
+    file.write_bytes(ply_bytes(sample.vertices, sample.cells))
+    with pytest.raises(ScenarioError, match=r"realisation: the heights of plates are drawn tile"):
+        load_scenario("rcs_drywall", [f"objects.sample.realisation={file}"])
