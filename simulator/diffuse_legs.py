@@ -41,6 +41,8 @@ LEAST_PEAK = 0.3
 """Product of two field patterns, over that of their peaks, that some place on a rough mirror needs
 for a chain over further mirrors to count: -10 dB. [-]"""
 
+TILE_RADIUS = TILE * 2**-0.5  # of the circle about a tile [m]
+
 MOST_SAMPLES = 50_000
 """Facets among which those places are chosen. [-]"""
 
@@ -85,6 +87,8 @@ def diffuse_wave(
         return spectrum
     mirrors = scene.mirrors.mirrors
     near, far = chain.before.image(array), chain.after.image(other)
+    if not _may_lead_there(mirrors, chain, near, far):
+        return spectrum
     some = facets_within_reach(scene, chain, near, far)
     if some.size == 0 or not _leads_there(scene, chain, array, other, some):
         return spectrum
@@ -173,27 +177,61 @@ def facets_within_reach(
     if owner not in scene.scattering:
         return nothing
     mirrors = among.mirrors
-    corners, normal = mirrors.corners[chain.rough], mirrors.normals[chain.rough]
-    along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
-    axes = np.stack([along, np.cross(normal, along)])
-    spans = np.einsum("cx,ax->ca", corners - corners[0], axes)
-    low, high = spans.min(axis=0), spans.max(axis=0)
-    counts = np.floor((high - low) / TILE).astype(np.int64) + 1
-    grid = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1)
-    middles = corners[0] + np.einsum("ija,ax->ijx", low + (grid + 0.5) * TILE, axes)
-    reached = in_reach([(near, far)], middles.reshape(-1, 3), TILE * 2**-0.5, level=DIFFUSE_LEVEL)
+    tiles = _Tiles.of(mirrors, chain.rough)
+    reached = in_reach([(near, far)], tiles.middles, TILE_RADIUS, level=DIFFUSE_LEVEL)
     if not reached.any():
         return nothing
     of_owner = np.flatnonzero(facets.material == scene.scattering.index(owner))
     limit: float = ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough] + CLEARANCE
     kept = []
     for some in np.array_split(of_owner, 1 + of_owner.size // FACETS_AT_ONCE):
-        apart = facets.centres[some] - corners[0]
-        cells = np.floor((np.einsum("fx,ax->fa", apart, axes) - low) / TILE).astype(np.int64)
-        cells = np.clip(cells, 0, counts - 1)
-        on_face = np.abs(np.einsum("fx,x->f", apart, normal)) <= limit
-        kept.append(some[on_face & reached[cells[:, 0] * counts[1] + cells[:, 1]]])
+        centres = facets.centres[some]
+        on_face = np.abs(mirrors.heights(centres, chain.rough)) <= limit
+        kept.append(some[on_face & reached[tiles.numbers(centres)]])
     return np.concatenate(kept)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Tiles:
+    """Squares that cover a mirror."""
+
+    corner: Float[np.ndarray, " 3"]  # where they begin [m]
+    axes: Float[np.ndarray, "2 3"]  # along their sides
+    counts: tuple[int, int]
+
+    @classmethod
+    def of(cls, mirrors: Mirrors, mirror: int) -> "_Tiles":
+        corners, normal = mirrors.corners[mirror], mirrors.normals[mirror]
+        along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+        axes = np.stack([along, np.cross(normal, along)])
+        spans = np.einsum("cx,ax->ca", corners - corners[0], axes)
+        low, high = spans.min(axis=0), spans.max(axis=0)
+        first, second = np.floor((high - low) / TILE).astype(np.int64) + 1
+        corner = corners[0] + np.einsum("a,ax->x", low, axes)
+        return cls(corner=corner, axes=axes, counts=(int(first), int(second)))
+
+    @property
+    def middles(self) -> Float[np.ndarray, "tiles 3"]:
+        """Their middles [m]."""
+        grid = np.stack(np.meshgrid(*(np.arange(n) for n in self.counts), indexing="ij"), axis=-1)
+        middles = self.corner + np.einsum("ija,ax->ijx", (grid + 0.5) * TILE, self.axes)
+        return np.asarray(middles.reshape(-1, 3))
+
+    def numbers(self, places: Float[np.ndarray, "places 3"]) -> Int[np.ndarray, " places"]:
+        """Return the tile of each place on the mirror."""
+        along = np.einsum("px,ax->pa", places - self.corner, self.axes)
+        cells = np.clip(np.floor(along / TILE).astype(np.int64), 0, np.array(self.counts) - 1)
+        numbers: Int[np.ndarray, " places"] = cells[:, 0] * self.counts[1] + cells[:, 1]
+        return numbers
+
+
+def _may_lead_there(mirrors: Mirrors, chain: DiffuseLeg, near: Sight, far: Sight) -> bool:
+    """Tell whether any tile of the rough mirror can be within both beams, whoever sees it."""
+    if not chain.before.bounces and not chain.after.bounces:
+        return True  # each facet is looked at, anyway
+    middles = _Tiles.of(mirrors, chain.rough).middles
+    bright = near.at_most(middles, TILE_RADIUS) * far.at_most(middles, TILE_RADIUS)
+    return bool(np.any(bright >= LEAST_PEAK))
 
 
 def _leads_there(

@@ -74,7 +74,7 @@ def needed_reach(
         ends = {id(sight): chain.before.image(sight) for sight in (send, array)}
         if chain.bounces <= most and chain.before.bounces:  # to a target, in any direction
             over_several += [(end, _anywhere(end)) for end in ends.values()]
-        if chain.bounces == 2:
+        if chain.bounces >= 2:
             over_several += [(chain.after.image(user), ends[id(array)]) for user in users]
     return partial(_either, pairs, over_several)
 

@@ -22,9 +22,6 @@ from simulator.sights import array_sight, in_space, user_sight
 from simulator.specular_field import specular_response
 from simulator.specular_paths import trace_chain
 
-MOST_DIFFUSE = 2
-"""Mirrors of the longest chain in space of which a pilot's diffuse part is summed. [-]"""
-
 
 def simulate_uplink(
     scene: RadioScene,
@@ -143,9 +140,8 @@ def _over_mirrors(
 def _diffuse_over_mirrors(
     scene: RadioScene, sender: Sight, array: Sight
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum what one rough mirror of two scatters diffusely, in space; longer chains are coherent."""
-    frequencies = scene.scenario.radio.frequencies
-    most = min(scene.scenario.max_bounces, MOST_DIFFUSE)
+    """Sum what any one rough mirror of two and more scatters diffusely, in space."""
+    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
     response = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     if scene.mirrors is None or most < 2:
         return response

@@ -174,3 +174,29 @@ def test_a_pilot_over_a_mirror_and_a_rough_wall_comes_from_the_users_image() -> 
     expected = -diffuse_wave(alone, single, array, image)  # a conductor turns the field round
     assert np.linalg.norm(expected) > 0
     assert np.linalg.norm(found - expected) <= 1e-3 * np.linalg.norm(expected)
+
+
+def test_a_pilot_over_two_mirrors_and_a_rough_wall_comes_from_the_image_of_the_users_image() -> (
+    None
+):
+    flat = {"kind": "plate", "material": "metal", "length_m": 1.2, "height_m": 0.6}
+    more = {
+        "aside": flat | {"centre_m": [1.0, 0.8, 0.0], "angle_deg": 45.0},  # y = x - 0.2
+        "above": flat | {"centre_m": [1.0, 1.6, 0.0], "angle_deg": 0.0},
+    }
+    options: Any = {"rms_mm": 1.0, "size_m": (0.2, 0.06), "antenna": {"kind": "isotropic"}}
+    _, all_three = scene(more=more, **options)
+    scenario, alone = scene(**options)
+    assert all_three.mirrors is not None
+    assert alone.mirrors is not None
+    array = array_sight(scenario, alone.elements)
+    # So high that the can is in nobody's way.
+    user = Sight(positions=np.array([[1.0, 1.2, 0.25]]), pattern=ISOTROPIC)
+    image = Sight(positions=np.array([[2.2, 0.8, 0.25]]), pattern=ISOTROPIC)
+    chains = diffuse_legs(all_three.mirrors.mirrors, all_three.mirrors.chains)
+    chain = next(one for one in chains if one.leg.sequence == (0, 1, 2) and one.rough == 0)
+    (single,) = (one for one in diffuse_legs(alone.mirrors.mirrors, alone.mirrors.legs[:1]))
+    found = diffuse_wave(all_three, chain, array, user)
+    expected = diffuse_wave(alone, single, array, image)  # two conductors turn it round twice
+    assert np.linalg.norm(expected) > 0
+    assert np.linalg.norm(found - expected) <= 1e-3 * np.linalg.norm(expected)

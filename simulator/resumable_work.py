@@ -1,0 +1,244 @@
+"""Tasks worked off by Dask, or in this process: a window of them at a time, so memory stays flat.
+
+What is done is known by its files, not by this module: a run that is stopped is taken up again by
+submitting what is missing. A worker that dies is replaced, and its task given to another.
+"""
+
+import functools
+import importlib
+import logging
+import signal
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+PATIENCE = 60.0
+"""How long a scheduler that somebody else started may have no worker. [s]"""
+
+DEATHS = 5
+"""How many workers may die over one task before it counts as failed."""
+
+
+class WorkError(RuntimeError):
+    """The work cannot go on; the message says why, and what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A call of a function that every worker can import."""
+
+    name: str  # unique among all tasks of a run; up to its first '-' it names their kind
+    function: Callable[..., Any]
+    arguments: tuple[object, ...] = field(default=(), repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Workers:
+    """Where tasks are worked off.
+
+    Processes of this machine, those of a Dask scheduler, or (``processes`` = 0) this process.
+    """
+
+    processes: int = 0
+    scheduler: str | None = None  # its address, before which processes do not count
+
+    @property
+    def in_this_process(self) -> bool:
+        """Whether nothing is started."""
+        return self.scheduler is None and self.processes == 0
+
+
+Result = object | Exception
+"""What a task returned, or what it raised."""
+
+
+def work_off(
+    tasks: Iterable[Task],
+    *,
+    workers: Workers,
+    on_result: Callable[[Task, Result], Iterable[Task]],
+) -> None:
+    """Work tasks off; this process only hands them out and looks at their results.
+
+    Parameters
+    ----------
+    tasks
+        Taken one by one as workers become free.
+    workers
+        Who does them. Each process is told to compute in one thread.
+    on_result
+        Told each result, in the order in which they come; returns tasks that are now possible.
+        An exception that it raises ends the work.
+
+    Raises
+    ------
+    WorkError
+        If the scheduler cannot be reached, has no workers, or is lost on the way.
+    """
+    queue = _Queue(iter(tasks))
+    if workers.in_this_process:
+        while (task := queue.next()) is not None:
+            queue.add(on_result(task, _result(task)))
+        return
+    as_completed = _distributed().as_completed
+    with _client(workers) as client:
+        running: dict[str, Task] = {}
+        finished = as_completed(loop=client.loop)
+        window = 0
+
+        def submit() -> None:
+            while len(running) < window and (task := queue.next()) is not None:
+                future = client.submit(
+                    _in_worker, task.function, task.arguments, key=task.name, pure=False
+                )
+                running[task.name] = task
+                finished.add(future)
+
+        window = _window(client)
+        submit()
+        for count, future in enumerate(finished):
+            task = running.pop(future.key)
+            queue.add(on_result(task, _outcome(future)))
+            future.release()
+            if workers.scheduler is not None and count % 64 == 0:
+                window = _window(client)  # a cluster grows and shrinks
+            submit()
+
+
+class _Queue:
+    """Tasks to come: those that became possible on the way first."""
+
+    def __init__(self, tasks: Iterator[Task]) -> None:
+        self._tasks = tasks
+        self._possible: deque[Task] = deque()
+
+    def add(self, tasks: Iterable[Task]) -> None:
+        self._possible.extend(tasks)
+
+    def next(self) -> Task | None:
+        return self._possible.popleft() if self._possible else next(self._tasks, None)
+
+
+def _result(task: Task) -> Result:
+    try:
+        return cast(object, task.function(*task.arguments))
+    except Exception as error:
+        return error
+
+
+def _outcome(future: Any) -> Result:
+    if future.status == "finished":
+        return cast(object, future.result())
+    if future.status == "error":
+        error = future.exception()
+        assert isinstance(error, Exception)
+        return error
+    raise WorkError(
+        f"the scheduler has lost a task ({future.status}); is it still there? The same command "
+        "goes on where this one ended"
+    )
+
+
+def _window(client: Any) -> int:
+    # Two for each thread: one in work, one at hand.
+    threads: int = sum(client.nthreads().values())
+    return 2 * max(threads, 1)
+
+
+@contextmanager
+def _client(workers: Workers) -> Iterator[Any]:
+    import dask
+
+    distributed = _distributed()
+    _quieten()
+    settings = {
+        "distributed.scheduler.allowed-failures": DEATHS,
+        # A paused worker never goes on where the memory is not its tasks' to free.
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.memory.pause": False,
+        "distributed.admin.log-length": 100,
+        "distributed.admin.low-level-log-length": 100,
+    }
+    with dask.config.set(settings):
+        if workers.scheduler is not None:
+            with _connected(workers.scheduler) as client:
+                yield client
+            return
+        with (
+            distributed.LocalCluster(
+                n_workers=workers.processes,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            distributed.Client(cluster, set_as_default=False) as client,
+        ):
+            client.register_plugin(_deaf_to_interruption())
+            yield client
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    try:
+        client = _distributed().Client(address, timeout=10, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise WorkError(
+            f"--scheduler {address}: cannot be reached ({type(error).__name__}); give the address "
+            "that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
+        ) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            raise WorkError(
+                f"--scheduler {address}: has no worker after {PATIENCE:.0f} s; start some with "
+                f"`dask worker {address} --nthreads 1`"
+            ) from error
+        yield client
+
+
+def _distributed() -> Any:
+    # Its own annotations are half finished; and only those that need it wait for it.
+    return importlib.import_module("distributed")
+
+
+def _quieten() -> None:
+    """Keep what the cluster says to itself off the screen: workers that die are expected."""
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _in_worker(function: Callable[..., Any], arguments: tuple[object, ...]) -> Any:
+    compute_in_one_thread()
+    return function(*arguments)
+
+
+def _deaf_to_interruption() -> Any:
+    """Make the workers of this machine ignore Ctrl-C, which a terminal sends to all at once.
+
+    It is this process that stops them then.
+    """
+
+    class Deaf(_distributed().WorkerPlugin):  # type: ignore[misc]
+        name = "deaf"
+
+        def setup(self, worker: Any) -> None:  # in each worker's main thread
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Deaf()
+
+
+@functools.cache
+def compute_in_one_thread() -> None:
+    """Compute in one thread: Dr.Jit takes all cores in every worker else."""
+    import estimator  # noqa: F401  points Dr.Jit to an LLVM that works before anything loads it
+    from estimator import engine
+
+    if engine.backend() == "llvm":
+        import drjit as dr
+
+        dr.set_thread_count(1)
