@@ -3,68 +3,24 @@
 import numpy as np
 import pytest
 import trimesh
-from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
-from scipy.special import hankel2, jv, spherical_jn, spherical_yn
 
 from scenes.rough_surface import rough_sheet
 from scenes.scenario import parse_scenario
 from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
-from simulator.facets import Facets, surface_facets
-from simulator.physical_optics import Ports, scattered
+from simulator.facets import surface_facets
+from simulator.physical_optics import scattered
 from simulator.radio_scene import radio_scene
 from simulator.ray_scene import facets_visible
 from simulator.simulation import simulate
-
-
-def isotropic(
-    directions: Float[np.ndarray, "facets 3"],
-    distances: Float[np.ndarray, " facets"],
-    frequencies: Float[np.ndarray, " nodes"],
-) -> Float[np.ndarray, "1 facets"]:
-    return np.ones((1, len(distances)))
-
-
-def ports(
-    positions: Float[np.ndarray, "ports 3"],
-    facets: Facets,
-    visible: Bool[np.ndarray, "ports facets"] | None = None,
-) -> Ports:
-    if visible is None:
-        visible = np.ones((len(positions), facets.count), dtype=bool)
-    return Ports(positions=positions, pattern=isotropic, visible=visible)
-
-
-def cross_section(
-    facets: Facets,
-    outward: Float[np.ndarray, "angles 3"],
-    distance: float,
-    frequencies: Float[np.ndarray, " freqs"],
-) -> Float[np.ndarray, "angles freqs"]:
-    """Radar cross-section by the radar equation. [m²]."""
-    port = ports(distance * outward, facets)
-    field = scattered(facets, port, port, frequencies, waves="spherical")
-    wavelengths = speed_of_light / frequencies
-    return np.asarray((4 * np.pi) ** 3 * distance**4 * np.abs(field / wavelengths) ** 2)
-
-
-def plate_facets(
-    width: float, height: float, *, step: float, heights: np.ndarray | None = None
-) -> Facets:
-    """A plate of triangles at y = 0 with heights along y."""
-    x, z = (
-        np.linspace(-side / 2, side / 2, int(np.ceil(side / step)) + 1) for side in (width, height)
-    )
-    across, up = np.meshgrid(x, z, indexing="ij")
-    depth = np.zeros(across.size) if heights is None else heights.ravel()
-    vertices = np.stack([across.ravel(), depth, up.ravel()], axis=-1)
-    cells = grid_triangles(np.arange(across.size).reshape(across.shape))
-    made = Surface(
-        name="plate", material="metal", vertices=vertices, mean_vertices=vertices, cells=cells,
-        closed=False,
-    )  # fmt: skip
-    return surface_facets(made)
+from validation.canonical_scatterers import (
+    cylinder_series,
+    facets_cross_section,
+    plate_cross_section,
+    plate_facets,
+    ports,
+    sphere_series,
+)
 
 
 @pytest.mark.parametrize("tilt_deg", [0.0, 30.0, 90.0])
@@ -79,11 +35,8 @@ def test_a_plates_pattern_is_within_a_fifth_of_a_decibel_down_to_25_decibels(
     sideways = np.sin(angles)
     outward = np.stack([np.cos(tilt) * sideways, -np.cos(angles), np.sin(tilt) * sideways], axis=-1)
     wavelengths = speed_of_light / band
-    turns = 2 * outward[:, None, :] / wavelengths[:, None]  # of phase per metre
-    pattern = np.sinc(turns[..., 0] * width) * np.sinc(turns[..., 2] * height)
-    expected = 4 * np.pi * (width * height / wavelengths) ** 2
-    expected = expected * (np.cos(angles)[:, None] * pattern) ** 2
-    measured = cross_section(facets, outward, distance, band)
+    expected = plate_cross_section((width, height), outward, wavelengths)
+    measured = facets_cross_section(facets, outward, distance, band)
     above = expected > expected.max(axis=0) * 10**-2.5
     assert np.count_nonzero(above) > 40
     error_db = 10 * np.log10(measured[above] / expected[above])
@@ -92,18 +45,6 @@ def test_a_plates_pattern_is_within_a_fifth_of_a_decibel_down_to_25_decibels(
     # And the plate's peak itself: 4πA²/λ².
     peak_db = 10 * np.log10(measured[60] / (4 * np.pi * (width * height / wavelengths) ** 2))
     assert np.abs(peak_db).max() <= 0.01
-
-
-def sphere_series(size: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Backscatter of a conducting sphere over πa², the Mie series in ka."""
-    total = np.zeros(size.size, dtype=np.complex128)
-    for order in range(1, int(size.max()) + 40):
-        j, y = spherical_jn(order, size), spherical_yn(order, size)
-        j_slope = j + size * spherical_jn(order, size, derivative=True)
-        y_slope = y + size * spherical_yn(order, size, derivative=True)
-        electric, magnetic = j_slope / (j_slope - 1j * y_slope), j / (j - 1j * y)
-        total += (-1) ** order * (2 * order + 1) * (electric - magnetic)
-    return np.asarray(np.abs(total / size) ** 2)
 
 
 def test_the_series_of_a_large_sphere_is_its_shadow_area() -> None:
@@ -129,21 +70,10 @@ def test_a_spheres_echo_is_that_of_its_series() -> None:
     )
     assert facets.extent <= speed_of_light / band[-1] / 4
     outward = np.array([[0.3, -0.9, 0.1]]) / np.linalg.norm([0.3, -0.9, 0.1])
-    measured = cross_section(facets, outward, 40.0, band)[0] / (np.pi * radius**2)
+    measured = facets_cross_section(facets, outward, 40.0, band)[0] / (np.pi * radius**2)
     error_db = 10 * np.log10(measured / sphere_series(size))
     # Physical optics ends at the shadow's edge: 1/(2ka) of the field, 0.22 dB at 20.
     assert np.abs(error_db).max() <= 0.5
-
-
-def cylinder_series(
-    radius: float, distance: float, wavenumbers: Float[np.ndarray, " freqs"]
-) -> Complex[np.ndarray, " freqs"]:
-    """Field that a line source gets back from a conducting cylinder, TM."""
-    total = np.zeros(wavenumbers.size, dtype=np.complex128)
-    for order in range(-int(2 * radius * wavenumbers.max()), int(2 * radius * wavenumbers.max())):
-        ratio = jv(order, wavenumbers * radius) / hankel2(order, wavenumbers * radius)
-        total += ratio * hankel2(order, wavenumbers * distance) ** 2
-    return np.asarray(0.25j * total)
 
 
 def test_a_cylinders_echo_is_that_of_its_series() -> None:

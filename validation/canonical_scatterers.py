@@ -1,0 +1,117 @@
+"""Bodies whose scattering has a closed form or a series: plate, sphere, cylinder, rough plate."""
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+from scipy.constants import speed_of_light
+from scipy.special import hankel2, jv, spherical_jn, spherical_yn
+
+from scenes.shapes import Surface
+from scenes.upright_shapes import grid_triangles
+from simulator.facets import Facets, surface_facets
+from simulator.physical_optics import Ports, isotropic, scattered
+
+
+def plate_cross_section(
+    size: tuple[float, float],
+    outward: Float[np.ndarray, "angles 3"],
+    wavelengths: Float[np.ndarray, " freqs"],
+) -> Float[np.ndarray, "angles freqs"]:
+    r"""Return the backscatter of a conducting plate at y = 0 by physical optics.
+
+    .. math:: \sigma = \frac{4 \pi A^2}{\lambda^2} \cos^2\theta \;
+              \mathrm{sinc}^2(2 a u_x / \lambda) \; \mathrm{sinc}^2(2 b u_z / \lambda)
+
+    Parameters
+    ----------
+    size
+        Width a along x and height b along z. [m]
+    outward
+        Unit vectors towards the antenna.
+    wavelengths
+        [m]
+
+    Returns
+    -------
+    Radar cross-section. [m²]
+    """
+    turns = 2 * outward[:, None, :] / wavelengths[:, None]  # of phase per metre
+    pattern = np.sinc(turns[..., 0] * size[0]) * np.sinc(turns[..., 2] * size[1])
+    peak = 4 * np.pi * (size[0] * size[1] / wavelengths) ** 2
+    found: np.ndarray = peak * (outward[:, None, 1] * pattern) ** 2
+    return found
+
+
+def sphere_series(size: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Sum the Mie series for the backscatter of a conducting sphere over πa², by its ka. [-]."""
+    total = np.zeros(size.size, dtype=np.complex128)
+    for order in range(1, int(size.max()) + 40):
+        j, y = spherical_jn(order, size), spherical_yn(order, size)
+        j_slope = j + size * spherical_jn(order, size, derivative=True)
+        y_slope = y + size * spherical_yn(order, size, derivative=True)
+        electric, magnetic = j_slope / (j_slope - 1j * y_slope), j / (j - 1j * y)
+        total += (-1) ** order * (2 * order + 1) * (electric - magnetic)
+    return np.asarray(np.abs(total / size) ** 2)
+
+
+def cylinder_series(
+    radius: float, distance: float, wavenumbers: Float[np.ndarray, " freqs"]
+) -> Complex[np.ndarray, " freqs"]:
+    """Return the field that a line source gets back from a conducting cylinder, TM.
+
+    In units of a line source, G = −(j/4)·H0⁽²⁾(kR).
+    """
+    total = np.zeros(wavenumbers.size, dtype=np.complex128)
+    for order in range(-int(2 * radius * wavenumbers.max()), int(2 * radius * wavenumbers.max())):
+        ratio = jv(order, wavenumbers * radius) / hankel2(order, wavenumbers * radius)
+        total += ratio * hankel2(order, wavenumbers * distance) ** 2
+    return np.asarray(0.25j * total)
+
+
+def plate_facets(
+    width: float,
+    height: float,
+    *,
+    step: float,
+    heights: Float[np.ndarray, "across up"] | None = None,
+) -> Facets:
+    """Cut a conducting plate at y = 0 into triangles, with heights along y. [m]."""
+    x, z = (
+        np.linspace(-side / 2, side / 2, int(np.ceil(side / step)) + 1) for side in (width, height)
+    )
+    across, up = np.meshgrid(x, z, indexing="ij")
+    depth = np.zeros(across.size) if heights is None else heights.ravel()
+    vertices = np.stack([across.ravel(), depth, up.ravel()], axis=-1)
+    cells = grid_triangles(np.arange(across.size).reshape(across.shape))
+    made = Surface(
+        name="plate",
+        material="metal",
+        vertices=vertices,
+        mean_vertices=vertices,
+        cells=cells,
+        closed=False,
+    )
+    return surface_facets(made)
+
+
+def ports(
+    positions: Float[np.ndarray, "ports 3"],
+    facets: Facets,
+    visible: Bool[np.ndarray, "ports facets"] | None = None,
+) -> Ports:
+    """Place isotropic antennas, which see all facets unless told otherwise. [m]."""
+    if visible is None:
+        visible = np.ones((len(positions), facets.count), dtype=bool)
+    return Ports(positions=positions, pattern=isotropic, visible=visible)
+
+
+def facets_cross_section(
+    facets: Facets,
+    outward: Float[np.ndarray, "angles 3"],
+    distance: float,
+    frequencies: Float[np.ndarray, " freqs"],
+) -> Float[np.ndarray, "angles freqs"]:
+    """Simulate echoes at a distance, and take cross-sections by the radar equation. [m²]."""
+    port = ports(distance * outward, facets)
+    field = scattered(facets, port, port, frequencies, waves="spherical")
+    wavelengths = speed_of_light / frequencies
+    return np.asarray((4 * np.pi) ** 3 * distance**4 * np.abs(field / wavelengths) ** 2)
