@@ -10,8 +10,9 @@ import pytest
 
 from estimator.measurement import MeasurementError
 from validation.full_wave_ghosts import compare_ghosts, main
+from validation.reference import ROUGH_WALL
 
-DATA = Path(__file__).parent.parent / "data"
+DATA = ROUGH_WALL.parent
 EVERY = {"positions": 3, "frequencies": 4}  # of what is stored: a quarter of the time
 
 Arrays = dict[str, np.ndarray]

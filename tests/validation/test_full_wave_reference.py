@@ -19,8 +19,9 @@ from validation.full_wave_reference import (
     main,
     read_reference,
 )
+from validation.reference import ROUGH_WALL
 
-REFERENCE = Path(__file__).parent.parent / "data" / "rough_wall_decimated.npz"
+REFERENCE = ROUGH_WALL
 
 
 def save(path: Path, arrays: dict[str, Any]) -> None:

@@ -4,7 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimator.estimate import Mirror
-from validation.metrics import nearest_wall, position_error, wall_error, wall_errors
+from validation.metrics import (
+    error_summary,
+    nearest_wall,
+    position_error,
+    wall_error,
+    wall_errors,
+)
 from validation.truth import Truth
 
 ROUNDING = 1e-12  # of sums over metres in double precision
@@ -79,3 +85,26 @@ def test_without_a_truth_there_is_nothing_to_compare_with() -> None:
 
 def test_the_error_of_a_position_is_its_distance_from_the_truth() -> None:
     assert position_error(np.array([1.0, 2.0, 2.0]), np.zeros(3)) == pytest.approx(3.0)
+
+
+def test_an_error_that_half_of_all_trials_keep_within_is_the_median() -> None:
+    summary = error_summary([0.3, 0.1, 0.2, 0.5, 0.4])
+    assert (summary.median, summary.ninth_decile, summary.worst) == (0.3, 0.5, 0.5)
+    assert summary.rms == pytest.approx(np.sqrt(0.55 / 5))
+    np.testing.assert_allclose(summary.cdf(np.array([0.05, 0.2, 1.0])), [0.0, 0.4, 1.0])
+
+
+def test_no_answer_counts_as_infinitely_wrong() -> None:
+    summary = error_summary([0.1, None, 0.2, None])
+    assert summary.missing == 2
+    assert summary.median == 0.2
+    assert summary.ninth_decile == float("inf")
+    assert summary.cdf(np.array([1e9]))[0] == 0.5
+    assert np.isnan(error_summary([None]).rms)
+
+
+def test_no_trials_and_no_distances_are_refused() -> None:
+    with pytest.raises(ValueError, match="no trials"):
+        error_summary([])
+    with pytest.raises(ValueError, match="cannot be negative or NaN"):
+        error_summary([0.1, float("nan")])

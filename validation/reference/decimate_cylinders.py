@@ -1,6 +1,6 @@
 """Make ``two_cylinders_decimated.npz`` from the reference ``two_cylinders_full_wave.npz``.
 
-    python tests/data/decimate_cylinders.py two_cylinders_full_wave.npz
+    python validation/reference/decimate_cylinders.py two_cylinders_full_wave.npz
 
 Every 10th position and every 10th frequency are kept, those of ``rough_wall_decimated.npz``,
 which also holds the profile of the wall.

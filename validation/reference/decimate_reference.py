@@ -1,6 +1,6 @@
 """Make ``rough_wall_decimated.npz`` from the full-wave reference ``rough_wall_full_wave.npz``.
 
-    python tests/data/decimate_reference.py rough_wall_full_wave.npz
+    python validation/reference/decimate_reference.py rough_wall_full_wave.npz
 
 Every 10th position and every 10th frequency are kept, and the whole wall profile.
 """
