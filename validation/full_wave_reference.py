@@ -10,6 +10,7 @@ equation, close to a Gaussian of width :math:`1/\sqrt{kb}`.
 """
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,6 +63,22 @@ def compare_with_full_wave(path: Path) -> tuple[Agreement, ...]:
         If the file is not of the layout.
     """
     reference = read_reference(path)
+    return tuple(
+        _agreement(name, simulated, reference[name])
+        for name, simulated in simulated_links(reference).items()
+    )
+
+
+def simulated_links(
+    reference: Mapping[str, np.ndarray],
+) -> dict[str, Complex[np.ndarray, "positions freqs"]]:
+    """Simulate what a reference holds of echo and uplinks, on its wall, in cylindrical waves.
+
+    Parameters
+    ----------
+    reference
+        See :func:`read_reference`.
+    """
     surface = profile_surface(reference["wall_profile"])
     facets = surface_facets(surface)
     scene = build_scene([surface])
@@ -78,15 +95,11 @@ def compare_with_full_wave(path: Path) -> tuple[Agreement, ...]:
         aim = reference["wall_profile"].mean(axis=0) - user
         senders["uplink_isotropic"] = ports(user[None], isotropic)
         senders["uplink_beam"] = ports(user[None], complex_source_beam(aim), BEAM_NODES)
-    return tuple(
-        _agreement(
-            name,
-            scattered(facets, sender, array, frequencies, waves="cylindrical"),
-            reference[name],
-        )
+    return {
+        name: scattered(facets, sender, array, frequencies, waves="cylindrical")
         for name, sender in senders.items()
         if name in reference
-    )
+    }
 
 
 def complex_source_beam(aim: Float[np.ndarray, " 3"]) -> Pattern:

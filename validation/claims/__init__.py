@@ -1,0 +1,13 @@
+"""All claims, by what they are about."""
+
+from validation.claim import Claim
+from validation.claims import closed_forms, full_wave, imaging, propagation, scenarios
+
+ALL_CLAIMS: tuple[Claim, ...] = (
+    *closed_forms.CLAIMS,
+    *propagation.CLAIMS,
+    *imaging.CLAIMS,
+    *full_wave.CLAIMS,
+    *scenarios.CLAIMS,
+)
+"""In the order in which they are told: physics first, then what is built on it."""
