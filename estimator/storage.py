@@ -10,6 +10,11 @@ Layout (dimensions in brackets)::
     frequency [frequency]                 Hz
     user [user]                           labels
     truth/                                never opened here for an estimate
+
+A dataset has a leading dimension ``sample``. What differs in length between its samples is
+padded with NaN; ``position_count`` and ``frequency_count`` say how much of a sample counts,
+``echo_present`` and ``uplink_present [user]`` what was received at all, and ``status`` whether
+the sample could be made. What is the same in all samples has no such dimension.
 """
 
 import shutil
@@ -28,6 +33,15 @@ FORMAT = 1
 
 TRUTH = "truth"
 """Group that holds what only a comparison may know."""
+
+PARAMETERS = "parameters"
+"""Group of a dataset that holds what was drawn for each sample; a part of the truth, too."""
+
+CONVENTIONS = (
+    "exp(+j omega t): a delay tau appears as exp(-j 2 pi f tau); metres; "
+    "x along the array, y boresight, z up"
+)
+"""How the numbers of a store are meant."""
 
 
 def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
@@ -60,8 +74,7 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
     dataset = xr.Dataset(variables, coordinates)
     dataset.attrs = {
         "mmslam_format": FORMAT,
-        "conventions": "exp(+j omega t): a delay tau appears as exp(-j 2 pi f tau); metres; "
-        "x along the array, y boresight, z up",
+        "conventions": CONVENTIONS,
         "waves": measurement.waves,
         "boresight": measurement.boresight.tolist(),
     }
@@ -179,7 +192,7 @@ class _WithoutTruth(WrapperStore[LocalStore]):
     async def list_dir(self, prefix: str) -> AsyncIterator[str]:
         """List what lies in a folder, but for the truth in the root."""
         async for name in super().list_dir(prefix):
-            if prefix.strip("/") or name.strip("/") != TRUTH:
+            if prefix.strip("/") or name.strip("/") not in (TRUTH, PARAMETERS):
                 yield name
 
 
@@ -207,11 +220,58 @@ def _one_sample(path: Path, dataset: xr.Dataset, sample: int | None) -> xr.Datas
     chosen = sample or 0
     if not 0 <= chosen < count:
         raise MeasurementError(f"{path}: sample {chosen} of {count}; it must be 0…{count - 1}")
-    return dataset.isel(sample=chosen)
+    return _without_padding(path, chosen, dataset.isel(sample=chosen).load())
+
+
+def _without_padding(path: Path, sample: int, dataset: xr.Dataset) -> xr.Dataset:
+    """Take away what a sample of a dataset has no values of.
+
+    The counts are stored apart from what they count: a missing chunk of either is noticed.
+    """
+    if "status" in dataset and int(dataset["status"]) != 0:
+        why = str(dataset["failure"].values) if "failure" in dataset else ""
+        raise MeasurementError(
+            f"{path}: sample {sample} could not be made ({why or 'nobody says why'}); choose "
+            "another one, or make it again with `mmslam dataset --retry-failed`"
+        )
+    for name, dimensions in _COUNTED.items():
+        if name not in dataset:
+            continue
+        count = int(dataset[name])
+        for dimension in dimensions & set(map(str, dataset.dims)):
+            if not 0 < count <= dataset.sizes[dimension]:
+                raise MeasurementError(
+                    f"{path}: {name} = {count} of sample {sample}, but there is room for "
+                    f"{dataset.sizes[dimension]}; the store may be truncated: write it again"
+                )
+            dataset = dataset.isel({dimension: slice(0, count)})
+    if "echo_present" in dataset and int(dataset["echo_present"]) == 0:
+        dataset = dataset.drop_vars("echo", errors="ignore")
+    if "uplink_present" in dataset and "uplink" in dataset:
+        present = dataset["uplink_present"].values == 1
+        if "uplink_count" in dataset and int(dataset["uplink_count"]) != int(present.sum()):
+            raise MeasurementError(
+                f"{path}: uplink_count = {int(dataset['uplink_count'])} of sample {sample}, but "
+                f"{int(present.sum())} users are marked; the store may be truncated: write it again"
+            )
+        if not present.any():
+            return dataset.drop_vars("uplink")
+        dataset = dataset.isel(user=np.flatnonzero(present))
+    return dataset
+
+
+_COUNTED = {
+    "position_count": {"position", "element"},
+    "frequency_count": {"frequency"},
+}
+"""Dimensions that each count cuts to what a sample has."""
 
 
 def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
-    attributes = dataset.attrs
+    attributes = dict(dataset.attrs)
+    for variable, key in (("boresight", "boresight"), ("clock_offset", "clock_offset_s")):
+        if variable in dataset and np.all(np.isfinite(dataset[variable].values)):
+            attributes[key] = dataset[variable].values.tolist()
     version = attributes.get("mmslam_format", FORMAT)
     if version != FORMAT:
         raise MeasurementError(

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from mmslam.failures import BAD_INPUT, stdout_kept_clean, told_clearly
+from mmslam.failures import BAD_INPUT, FALLS_SHORT, stdout_kept_clean, told_clearly
 
 app = typer.Typer(
     name="mmslam",
@@ -35,6 +35,22 @@ AsJson = Annotated[
 ]
 OutFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")
+]
+WorkerCount = Annotated[
+    int | None,
+    typer.Option(
+        min=0, help="Processes of one thread each [one for each core]; 0: none but this one."
+    ),
+]
+SchedulerAddress = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS", help="A Dask scheduler whose workers are used in place of --workers."
+    ),
+]
+DryRun = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Only say how many, how long and how large, by one of them."),
 ]
 OutFile = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE.zarr", help="Measurement file to write.")
@@ -267,30 +283,228 @@ def import_(
 
 @app.command()
 def export(
-    measurement: Annotated[Path, typer.Argument(metavar="FILE.zarr", help="The measurement.")],
+    measurement: Annotated[
+        Path, typer.Argument(metavar="FILE.zarr", help="The measurement or dataset.")
+    ],
     touchstone: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--touchstone", metavar="DIR", help="Folder to write: a file for each position."
         ),
-    ],
+    ] = None,
+    netcdf: Annotated[
+        Path | None, typer.Option("--netcdf", metavar="FILE.nc", help="NetCDF-4 file to write.")
+    ] = None,
+    matlab: Annotated[
+        Path | None, typer.Option("--matlab", metavar="FILE.mat", help="MATLAB file to write.")
+    ] = None,
     sample: Annotated[
-        int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
+        list[int] | None,
+        typer.Option(
+            min=0, help="Which sample, if the file is a dataset. Repeatable, but for --touchstone."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a measurement as Touchstone files, with the mapping that imports them again.
+    """Write a measurement as Touchstone files, or a dataset's samples as NetCDF or MATLAB.
 
-    What an earlier export wrote to DIR is replaced; a foreign folder is refused.
+    Touchstone files come with the mapping that imports them again; what an earlier export wrote
+    to DIR is replaced, a foreign folder refused. NetCDF and MATLAB hold all samples by default,
+    with their truth.
     """
     with told_clearly():
-        from mmslam.measurement_files import export_to_touchstone
+        if sum(one is not None for one in (touchstone, netcdf, matlab)) != 1:
+            raise typer.BadParameter("give one of --touchstone, --netcdf and --matlab")
+        if touchstone is not None:
+            from mmslam.measurement_files import export_to_touchstone
 
-        count = export_to_touchstone(measurement, sample=sample, folder=touchstone)
-        if as_json:
-            _print_json({"folder": str(touchstone), "files": count})
+            if sample is not None and len(sample) > 1:
+                raise typer.BadParameter("--touchstone takes one --sample at a time")
+            count = export_to_touchstone(
+                measurement, sample=sample[0] if sample else None, folder=touchstone
+            )
+            told: dict[str, Any] = {"folder": str(touchstone), "files": count}
+            line = f"{touchstone}: {count} Touchstone files"
         else:
-            typer.echo(f"{touchstone}: {count} Touchstone files")
+            from mmslam.export_arrays import export_matlab, export_netcdf
+
+            if netcdf is not None:
+                file, count = netcdf, export_netcdf(measurement, netcdf, samples=sample)
+            else:
+                assert matlab is not None
+                file, count = matlab, export_matlab(measurement, matlab, samples=sample)
+            told = {"file": str(file), "variables": count}
+            line = f"{file}: {count} variables"
+        if as_json:
+            _print_json(told)
+        else:
+            typer.echo(line)
+
+
+@app.command()
+def dataset(
+    config: Annotated[
+        Path | None, typer.Argument(metavar="CONFIG", help="A TOML file: what varies, and how.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE.zarr", help="Dataset to write.")
+    ] = None,
+    workers: WorkerCount = None,
+    scheduler: SchedulerAddress = None,
+    dry_run: DryRun = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Make samples again that have failed.")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of CONFIG.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate many variations of a scenario into one store, for training and testing.
+
+    Sample n depends on the seed and n alone, whoever makes it. Interrupted or killed, the same
+    command goes on; then, too, the store is the same to the byte. Exit code 1: samples failed.
+    """
+    with told_clearly():
+        if schema:
+            with stdout_kept_clean():
+                from simulator.dataset_config import DatasetConfig
+            _print_json(DatasetConfig.model_json_schema())
+            return
+        if config is None or output is None:
+            raise typer.BadParameter("needs CONFIG and --output FILE.zarr")
+        with stdout_kept_clean():
+            from mmslam import dataset_command as commands
+
+            where = commands.chosen_workers(workers, scheduler)
+            if dry_run:
+                found = commands.look_ahead(config, output, workers=max(where.processes, 1))
+            else:
+                found = commands.make(config, output, workers=where, retry_failed=retry_failed)
+        if as_json:
+            _print_json(found)
+        else:
+            commands.print_lines(
+                commands.forecast_lines(found) if dry_run else commands.lines(found)
+            )
+        if found.get("failed"):
+            raise typer.Exit(FALLS_SHORT)
+
+
+@app.command()
+def sweep(
+    config: Annotated[
+        Path | None,
+        typer.Argument(metavar="CONFIG", help="A TOML file: what is swept, and how often."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for tables and figures [out/CONFIG]."),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            "--cache", metavar="DIR", help="Where what was computed is kept [out/sweep_cache]."
+        ),
+    ] = None,
+    workers: WorkerCount = None,
+    scheduler: SchedulerAddress = None,
+    dry_run: DryRun = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of CONFIG.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Locate users over a grid of a scenario's keys: error tables, and figures with the bound.
+
+    What was computed before is not computed again, also after Ctrl-C. Exit code 1: points failed.
+    """
+    with told_clearly():
+        if schema:
+            with stdout_kept_clean():
+                from validation.sweep import SweepConfig
+            _print_json(SweepConfig.model_json_schema())
+            return
+        if config is None:
+            raise typer.BadParameter("needs CONFIG")
+        with stdout_kept_clean():
+            from mmslam import sweep_command as commands
+            from mmslam.dataset_command import chosen_workers, print_lines
+
+            where = chosen_workers(workers, scheduler)
+            kept = cache or commands.DEFAULT_CACHE
+            if dry_run:
+                found = commands.look_ahead(config, cache=kept, workers=max(where.processes, 1))
+            else:
+                folder = out or Path("out") / config.stem
+                found = commands.run(config, folder, cache=kept, workers=where)
+        if as_json:
+            _print_json(found)
+        else:
+            say = commands.forecast_lines if dry_run else commands.lines
+            print_lines(say(found))
+        if found.get("failed"):
+            raise typer.Exit(FALLS_SHORT)
+
+
+@app.command()
+def validate(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer seeds and points, within three minutes.")
+    ] = False,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="KEY", help="A claim alone. Repeatable.")
+    ] = None,
+    out: OutFolder = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Measure again what an earlier run has measured.")
+    ] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the claims, and end.")] = False,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep the figures there, and make the page of results."),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Fail if figures kept there no longer hold."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check every claim: our figure beside the thesis' or the theory's, with its limit.
+
+    Writes each claim's numbers and figure to `--out` (default `out/validate/` or
+    `out/validate-quick/`). Interrupted, the same command goes on where it was.
+    """
+    with told_clearly():
+        from mmslam import validate_command as commands
+
+        keys = only or []
+        if listed:
+            for claim in commands.chosen_claims(keys, quick=quick):
+                form = "quick" if claim.quick else "full only"
+                typer.echo(f"{claim.key:<20} {form:<10} {claim.minutes:4g} min  {claim.title}")
+            return
+        folder = out or Path("out") / ("validate-quick" if quick else "validate")
+        with commands.console_on_stdout() as console, stdout_kept_clean():
+            found = commands.check_claims(
+                keys,
+                quick=quick,
+                folder=folder,
+                fresh=fresh,
+                shown=(lambda table: None) if as_json else console.print,
+            )
+        gone = [] if against is None else commands.drift(found, against)
+        if record is not None:
+            commands.record(found, record, folder)
+        if as_json:
+            _print_json({**found, "drifted": gone})
+        else:
+            for line in gone:
+                typer.echo(f"no longer holds: {line}")
+            typer.echo(commands.summary_line(found))
+            typer.echo(f"figures: {folder}")
+        if gone or not found["passed"]:
+            raise typer.Exit(FALLS_SHORT)
 
 
 @app.command()

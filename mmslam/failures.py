@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import typer
 
-from mmslam.interruption import interruptions_noted
+from mmslam.interruption import ResumableInterruption, interruptions_noted
 
+FALLS_SHORT = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
 
@@ -21,7 +22,8 @@ def told_clearly() -> Iterator[None]:
             yield
         except (Exception, KeyboardInterrupt) as error:
             if interrupted() or isinstance(error, KeyboardInterrupt):
-                _say("interrupted; nothing was written")
+                resumable = isinstance(error, ResumableInterruption)
+                _say(str(error) if resumable else "interrupted; nothing was written")
                 raise typer.Exit(INTERRUPTED) from None
             if not isinstance(error, _users_errors()):
                 raise

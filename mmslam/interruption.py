@@ -12,6 +12,10 @@ from contextlib import contextmanager
 from types import FrameType
 
 
+class ResumableInterruption(KeyboardInterrupt):
+    """Ctrl-C came while something was made that can be gone on with; the message says how."""
+
+
 @contextmanager
 def interruptions_held() -> Iterator[Callable[[], None]]:
     """Hold Ctrl-C back until the block ends; pressed twice, it comes at once.

@@ -36,7 +36,9 @@ def shown(value: object) -> str:
     return _SHORT.repr(value)
 
 
-def problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
+def problems(
+    error: ValidationError, model: type[BaseModel], *, of_keys_only: bool = False
+) -> list[str]:
     """Turn pydantic's findings into lines that name the key, the value and the remedy.
 
     Parameters
@@ -45,12 +47,15 @@ def problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
         What pydantic found in the input of ``model``.
     model
         The model that was read; its field descriptions serve as remedies.
+    of_keys_only
+        Leave out what is wrong between keys that are right each for itself: what stands in the
+        way of what.
     """
     lines: list[str] = []
     for finding in error.errors(include_url=False):
         context: dict[str, Any] = finding.get("ctx", {})
         if "problems" in context:  # found after all keys were read, one line each
-            lines += context["problems"]
+            lines += [] if of_keys_only else context["problems"]
             continue
         place = _place(finding["loc"], model)
         lines.append(_line(place, finding["type"], finding["msg"], context, finding["input"]))

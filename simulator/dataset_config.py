@@ -42,7 +42,27 @@ def identity(space: SampleSpace) -> dict[str, str]:
     ScenarioError
         If a file of the base scenario cannot be read.
     """
-    tables = space.source.changed()
+    return {
+        "config": json.dumps(space.variations.model_dump(), sort_keys=True, ensure_ascii=False),
+        "base": content_text(space.source.changed()),
+        "versions": json.dumps(package_versions(), sort_keys=True),
+        "code": code_digest(),
+    }
+
+
+def content_text(tables: dict[str, Any]) -> str:
+    """Write a scenario's tables as TOML that tells what is in their files, not where they are.
+
+    Parameters
+    ----------
+    tables
+        With absolute paths; changed in place.
+
+    Raises
+    ------
+    ScenarioError
+        If a file cannot be read.
+    """
     for body in _with_files(tables):
         try:
             content = Path(body["file"]).read_bytes()
@@ -52,12 +72,7 @@ def identity(space: SampleSpace) -> dict[str, str]:
             ) from None
         digest = hashlib.sha256(content).hexdigest()[:16]
         body["file"] = f"{Path(body['file']).name} (sha256 {digest}…)"
-    return {
-        "config": json.dumps(space.variations.model_dump(), sort_keys=True, ensure_ascii=False),
-        "base": toml_text(tables),
-        "versions": json.dumps(package_versions(), sort_keys=True),
-        "code": code_digest(),
-    }
+    return toml_text(tables)
 
 
 def differences(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:

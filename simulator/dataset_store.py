@@ -121,7 +121,7 @@ class GrowingDataset:
                 continue
             for at, sample in enumerate(self.layout.block_samples(block)):
                 if int(labels["status"][at]) != FAILED:
-                    row = {key: values[at] for key, values in labels.items()}
+                    row = {key: _only(values[at : at + 1]) for key, values in labels.items()}
                     self.put(sample, row | _read_large(self.store, self.layout, sample))
             self._block_file(block).unlink()
 
@@ -367,7 +367,13 @@ def _read_large(store: Path, layout: Layout, sample: int) -> Row:
 
 def _read_row(store: Path, layout: Layout, sample: int) -> Row:
     labels = _read_labels(store, layout, range(sample, sample + 1))
-    return {key: values[0] for key, values in labels.items()} | _read_large(store, layout, sample)
+    alone = {key: _only(values) for key, values in labels.items()}
+    return alone | _read_large(store, layout, sample)
+
+
+def _only(values: np.ndarray) -> np.ndarray:
+    """Take the leading dimension away; of texts too, which an index would turn into `str`."""
+    return values.reshape(values.shape[1:])
 
 
 def _save(path: Path, row: Row) -> None:

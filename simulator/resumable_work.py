@@ -17,6 +17,9 @@ from typing import Any, cast
 PATIENCE = 60.0
 """How long a scheduler that somebody else started may have no worker. [s]"""
 
+CONNECTING = 10.0
+"""How long a scheduler may take to answer. [s]"""
+
 DEATHS = 5
 """How many workers may die over one task before it counts as failed."""
 
@@ -96,7 +99,7 @@ def work_off(
                 running[task.name] = task
                 finished.add(future)
 
-        window = _window(client)
+        window = _window(client) if workers.scheduler is not None else 2 * workers.processes
         submit()
         for count, future in enumerate(finished):
             task = running.pop(future.key)
@@ -173,18 +176,20 @@ def _client(workers: Workers) -> Iterator[Any]:
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address=None,
+                # Without a dashboard, too, it serves its health, else at a port that may be taken.
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                 silence_logs=logging.CRITICAL,
+                preload=[__name__],
             ) as cluster,
             distributed.Client(cluster, set_as_default=False) as client,
         ):
-            client.register_plugin(_deaf_to_interruption())
             yield client
 
 
 @contextmanager
 def _connected(address: str) -> Iterator[Any]:
     try:
-        client = _distributed().Client(address, timeout=10, set_as_default=False)
+        client = _distributed().Client(address, timeout=CONNECTING, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise WorkError(
             f"--scheduler {address}: cannot be reached ({type(error).__name__}); give the address "
@@ -217,19 +222,13 @@ def _in_worker(function: Callable[..., Any], arguments: tuple[object, ...]) -> A
     return function(*arguments)
 
 
-def _deaf_to_interruption() -> Any:
-    """Make the workers of this machine ignore Ctrl-C, which a terminal sends to all at once.
+def dask_setup(worker: Any) -> None:
+    """Make a worker of this machine deaf to Ctrl-C, which a terminal sends to all at once.
 
-    It is this process that stops them then.
+    Dask calls it in each worker's main thread as it starts. It is the process that hands out the
+    work that stops them then.
     """
-
-    class Deaf(_distributed().WorkerPlugin):  # type: ignore[misc]
-        name = "deaf"
-
-        def setup(self, worker: Any) -> None:  # in each worker's main thread
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    return Deaf()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @functools.cache

@@ -47,7 +47,8 @@ def planned(folder: Path, text: str = POINTS, name: str = "it.zarr") -> DatasetJ
 
 
 def opened(job: DatasetJob, group: str | None = None) -> xr.Dataset:
-    return xr.open_zarr(job.target, group=group, consolidated=False, chunks=None).load()
+    found: xr.Dataset = xr.open_zarr(job.target, group=group, consolidated=False, chunks=None)
+    return found.load()
 
 
 def same_bytes(one: Path, other: Path) -> bool:
@@ -193,7 +194,7 @@ def test_another_configuration_or_version_is_refused_not_mixed(
         make_dataset(moved, workers=HERE)
     begun = planned(tmp_path)
     with pytest.raises(ZeroDivisionError):
-        make_dataset(begun, workers=HERE, tell=lambda done, failed, total: 1 // (2 - done))
+        make_dataset(begun, workers=HERE, tell=lambda done, *_: print(1 // (2 - done)))
     changed = planned(tmp_path, POINTS.replace("high = 30.0", "high = 31.0"))
     with pytest.raises(DatasetError, match=r"begun with another config \(vary\)"):
         make_dataset(changed, workers=HERE)
@@ -244,7 +245,7 @@ def test_failed_samples_are_listed_and_made_again_alone(
     snr = job.space.first(2)[0].values["noise.snr_db"]
     assert summary.failures[0].parameters["noise.snr_db"] == snr
     assert opened(job)["status"].values.tolist() == [0, 0, 1, 0, 0, 0, 0, 0, 0, 1]
-    with pytest.raises(MeasurementError, match="sample 2 could not be made.*--retry-failed"):
+    with pytest.raises(MeasurementError, match=r"sample 2 could not be made.*--retry-failed"):
         read_measurement(job.target, sample=2)
     assert read_measurement(job.target, sample=3).echo is not None
     # Interrupted while it makes them again, and then with what is unfinished:

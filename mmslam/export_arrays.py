@@ -1,0 +1,213 @@
+"""A measurement or a dataset, or some of its samples, as one NetCDF or MATLAB file.
+
+Both hold what the store holds, groups and all: NetCDF as groups, MATLAB as structures. Read some
+samples at a time, NetCDF takes a dataset of any size; MATLAB's format holds 2 GiB a variable.
+"""
+
+import importlib
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+
+from estimator.measurement import MeasurementError
+from estimator.storage import is_store
+from mmslam.output import OutputError
+
+SAMPLES_AT_ONCE = 64
+"""Samples that are in memory together while NetCDF is written."""
+
+LARGEST_IN_MATLAB = 2**31 - 1
+"""Most bytes of one variable in a MATLAB file of version 5. [byte]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredArray:
+    """One variable of a store."""
+
+    group: str  # "" is the root
+    name: str
+    array: Any  # of Zarr
+    dimensions: tuple[str, ...]
+    samples: Sequence[int] | None  # those chosen; None: it has no such dimension
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of what was chosen."""
+        shape: tuple[int, ...] = self.array.shape
+        return shape if self.samples is None else (len(self.samples), *shape[1:])
+
+    def read(self, start: int = 0, stop: int | None = None) -> np.ndarray:
+        """Read what was chosen, or some of the chosen samples."""
+        if self.samples is None:
+            return np.asarray(self.array[...])
+        chosen = list(self.samples[start:stop])
+        if chosen == list(range(chosen[0], chosen[0] + len(chosen))):
+            return np.asarray(self.array[chosen[0] : chosen[0] + len(chosen)])
+        return np.asarray(self.array.oindex[chosen])
+
+
+def export_netcdf(store: Path, file: Path, *, samples: Sequence[int] | None = None) -> int:
+    """Write a store as NetCDF-4, complex numbers as netCDF4's ``auto_complex`` reads them.
+
+    Parameters
+    ----------
+    store
+        A measurement or a dataset.
+    file
+        The file to write; it must not exist.
+    samples
+        Of a dataset; None: all.
+
+    Returns
+    -------
+    The number of variables.
+
+    Raises
+    ------
+    MeasurementError, OutputError
+        If the store cannot be read, a sample is not there, or the file cannot be written.
+    """
+    try:
+        netcdf = importlib.import_module("netCDF4")
+    except ImportError as error:
+        raise OutputError(
+            "NetCDF needs another package: install `mmslam[netcdf]`, or export to --matlab"
+        ) from error
+    root = _opened(store)
+    arrays = _arrays(root, store, samples)
+    with _new(file) as part, netcdf.Dataset(part, "w", auto_complex=True) as written:
+        written.setncatts(_attributes(root.attrs.asdict()))
+        for one in arrays:
+            group = written.createGroup(one.group) if one.group else written
+            for dimension, length in zip(one.dimensions, one.shape, strict=True):
+                if dimension not in group.dimensions:
+                    group.createDimension(dimension, length)
+            text = one.array.dtype.kind == "T"
+            kind = str if text else one.array.dtype
+            packed = {} if text or not one.shape else {"compression": "zlib", "complevel": 1}
+            variable = group.createVariable(one.name, kind, one.dimensions, **packed)
+            variable.setncatts(_attributes(one.array.attrs.asdict()))
+            if one.samples is None:
+                variable[...] = _plain(one.read())
+            else:
+                for start in range(0, len(one.samples), SAMPLES_AT_ONCE):
+                    values = one.read(start, start + SAMPLES_AT_ONCE)
+                    variable[start : start + len(values)] = _plain(values)
+    return len(arrays)
+
+
+def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = None) -> int:
+    """Write a store as a MATLAB file of version 5; arguments as of :func:`export_netcdf`.
+
+    Groups are structures. A key such as ``noise.snr_db`` is called ``noise_snr_db``; units and
+    other attributes are in the structure ``attributes``.
+    """
+    from scipy.io import savemat
+
+    root = _opened(store)
+    arrays = _arrays(root, store, samples)
+    content: dict[str, Any] = {}
+    told: dict[str, Any] = {}
+    for one in arrays:
+        size = int(np.prod(one.shape)) * one.array.dtype.itemsize
+        if size > LARGEST_IN_MATLAB:
+            raise OutputError(
+                f"{one.name} has {size / 2**30:.1f} GiB, more than the 2 GiB that MATLAB's format "
+                "holds; choose some samples with --sample, or export to --netcdf"
+            )
+        values = one.read()
+        if values.dtype.kind == "T":
+            values = np.array(values.tolist(), dtype=object)
+        elif values.ndim == 1:
+            values = values[:, None]  # a column, as MATLAB thinks of them
+        _place(content, one.group)[_identifier(one.name)] = values
+        if attributes := _attributes(one.array.attrs.asdict()):
+            _place(told, one.group)[_identifier(one.name)] = attributes
+    about = {_identifier(key): value for key, value in _attributes(root.attrs.asdict()).items()}
+    content["attributes"] = {**about, "variables": told}
+    with _new(file) as part:
+        savemat(part, content, do_compression=True, long_field_names=True, appendmat=False)
+    return len(arrays)
+
+
+def _opened(store: Path) -> zarr.Group:
+    if not is_store(store):
+        raise MeasurementError(f"{store}: not a Zarr v3 group; name a measurement or a dataset")
+    return zarr.open_group(store, mode="r")
+
+
+def _arrays(root: zarr.Group, store: Path, samples: Sequence[int] | None) -> list[StoredArray]:
+    found = []
+    for path, array in root.members(max_depth=None):
+        if not isinstance(array, zarr.Array):
+            continue
+        group, _, name = path.rpartition("/")
+        names = getattr(array.metadata, "dimension_names", None) or ()
+        dimensions = tuple(str(one) for one in names)
+        if len(dimensions) != array.ndim:
+            raise MeasurementError(f"{store}: {path!r} does not name its dimensions")
+        chosen: Sequence[int] | None = None
+        if dimensions[:1] == ("sample",):
+            count = array.shape[0]
+            chosen = range(count) if samples is None else list(samples)
+            for sample in chosen if samples is not None else ():
+                if not 0 <= sample < count:
+                    raise MeasurementError(
+                        f"{store}: sample {sample} of {count}; it must be 0…{count - 1}"
+                    )
+        found.append(
+            StoredArray(group=group, name=name, array=array, dimensions=dimensions, samples=chosen)
+        )
+    if samples is not None and all(one.samples is None for one in found):
+        raise MeasurementError(f"{store}: no 'sample' dimension; leave --sample out")
+    return sorted(found, key=lambda one: (one.group, one.name))
+
+
+@contextmanager
+def _new(file: Path) -> Iterator[Path]:
+    """Give a path to write to, that becomes ``file`` when all is written."""
+    if file.exists():
+        raise OutputError(f"{file} exists; move it away or choose another name")
+    part = file.with_name(f".{file.name}.{os.getpid()}.part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        part.rename(file)
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {file}: {error.strerror or error}; choose another place"
+        ) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _attributes(attributes: dict[str, Any]) -> dict[str, Any]:
+    plain = (str, int, float, list)
+    return {
+        key: value
+        for key, value in attributes.items()
+        if isinstance(value, plain) and not isinstance(value, bool)
+    }
+
+
+def _plain(values: np.ndarray) -> np.ndarray:
+    return np.array(values.tolist(), dtype=object) if values.dtype.kind == "T" else values
+
+
+def _place(content: dict[str, Any], group: str) -> dict[str, Any]:
+    for part in group.split("/") if group else ():
+        content = content.setdefault(part, {})
+    return content
+
+
+def _identifier(name: str) -> str:
+    """Make a name that MATLAB takes: letters, digits and underscores, a letter first."""
+    plain = re.sub(r"\W", "_", name)
+    return (plain if plain[:1].isalpha() else f"x{plain}")[:63]

@@ -1,0 +1,76 @@
+import os
+import signal
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+from simulator import resumable_work
+from simulator.resumable_work import Result, Task, WorkError, Workers, work_off
+
+
+def square(number: int) -> int:
+    if number == 3:
+        raise ZeroDivisionError("three")
+    return number**2
+
+
+def die_once(mark: Path) -> str:
+    """Kill the own process, as a full memory does; the next one that tries lives."""
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "alive"
+
+
+def threads() -> int:
+    import drjit as dr
+
+    return int(dr.thread_count())
+
+
+@pytest.mark.parametrize("processes", [0, 2])
+def test_every_task_is_done_once_and_failures_are_told(processes: int, tmp_path: Path) -> None:
+    found: dict[str, Result] = {}
+    most_ahead = 0
+    drawn = 0
+
+    def tasks() -> Iterator[Task]:
+        nonlocal drawn
+        for number in range(40):
+            drawn += 1
+            yield Task(name=f"square-{number}", function=square, arguments=(number,))
+
+    def on_result(task: Task, result: Result) -> Iterable[Task]:
+        nonlocal most_ahead
+        assert task.name not in found
+        found[task.name] = result
+        most_ahead = max(most_ahead, drawn - len(found))
+        if task.name == "square-5":
+            return [
+                Task(name="more", function=threads),
+                Task(name="die", function=die_once, arguments=(tmp_path / "mark",)),
+            ]
+        return []
+
+    if processes == 0:
+        (tmp_path / "mark").touch()  # this process shall live
+    began = time.monotonic()
+    work_off(tasks(), workers=Workers(processes=processes), on_result=on_result)
+    assert time.monotonic() - began < 60
+    assert len(found) == 42
+    assert isinstance(found["square-3"], ZeroDivisionError)
+    assert found["square-39"] == 1521
+    assert found["die"] == "alive"
+    assert most_ahead <= 2 * max(processes, 1)  # never all tasks at once
+    if processes:
+        assert found["more"] == 1  # each worker computes in one thread
+
+
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resumable_work, "CONNECTING", 0.5)
+    workers = Workers(scheduler="tcp://127.0.0.1:9")  # the port 'discard': nobody listens
+    task = Task(name="square-1", function=square, arguments=(1,))
+    with pytest.raises(WorkError, match=r"--scheduler tcp://127\.0\.0\.1:9: cannot be reached"):
+        work_off([task], workers=workers, on_result=lambda task, result: [])
