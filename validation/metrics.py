@@ -96,3 +96,65 @@ def _from_segment(
     share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
     distances: np.ndarray = np.linalg.norm(points - (start + share[:, None] * along), axis=-1)
     return distances
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorSummary:
+    """Position errors of many trials; those without an answer count as infinitely wrong."""
+
+    errors: Float[np.ndarray, " found"]  # of the answers, in ascending order [m]
+    trials: int  # in all, with those that gave no answer [-]
+
+    @property
+    def missing(self) -> int:
+        """Trials without an answer."""
+        return self.trials - len(self.errors)
+
+    @property
+    def median(self) -> float:
+        """Error that half of all trials keep within. [m]."""
+        return self.within(0.5)
+
+    @property
+    def ninth_decile(self) -> float:
+        """Error that 90 % of all trials keep within. [m]."""
+        return self.within(0.9)
+
+    @property
+    def worst(self) -> float:
+        """Error that all trials keep within. [m]."""
+        return self.within(1.0)
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the answers' errors alone; NaN without any. [m]."""
+        return float(np.sqrt(np.mean(self.errors**2))) if self.errors.size else float("nan")
+
+    def within(self, share: float) -> float:
+        """Return the least error that a share of all trials keeps within; inf if none does. [m].
+
+        The smallest of the errors whose rank is at least that share: a value that occurred.
+        """
+        rank = max(int(np.ceil(share * self.trials - 1e-9)), 1)
+        return float(self.errors[rank - 1]) if rank <= len(self.errors) else float("inf")
+
+    def cdf(self, limits: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+        """Return the share of all trials that err by no more than each limit. [-]."""
+        counts = np.searchsorted(self.errors, limits, side="right")
+        return np.asarray(counts / self.trials)
+
+
+def error_summary(errors: Sequence[float | None]) -> ErrorSummary:
+    """Sum up the position errors of trials; ``None`` is a trial without an answer.
+
+    Raises
+    ------
+    ValueError
+        If there is no trial, or an error is negative or NaN.
+    """
+    if not errors:
+        raise ValueError("no trials to sum up; give at least one error, or None for no answer")
+    found = np.sort(np.array([error for error in errors if error is not None], dtype=np.float64))
+    if np.any(~(found >= 0)):
+        raise ValueError(f"errors = {found.tolist()}: a distance cannot be negative or NaN")
+    return ErrorSummary(errors=found, trials=len(errors))

@@ -47,8 +47,8 @@ def test_the_simulator_is_too_bright_in_the_bragg_regime_and_right_in_the_uplink
     assert bragg.image_level_db == pytest.approx(BRAGG_DB, abs=1.5)
     assert bragg.uplink > 0.99
     assert abs(bragg.uplink_level_db) < 0.3
-    assert bragg.uplink_trusted
-    assert not bragg.image_trusted
+    assert bragg.trusted("uplink")
+    assert not bragg.trusted("image")
 
 
 def test_the_same_fields_agree_and_twice_the_field_is_six_decibels_up() -> None:
@@ -60,15 +60,15 @@ def test_the_same_fields_agree_and_twice_the_field_is_six_decibels_up() -> None:
 
 
 def test_image_and_uplink_are_trusted_each_by_itself() -> None:
-    assert GOOD.image_trusted
-    assert GOOD.uplink_trusted
+    assert GOOD.trusted("image")
+    assert GOOD.trusted("uplink")
     for wrong in (replace(GOOD, image=0.94), replace(GOOD, image_level_db=-2.1)):
-        assert not wrong.image_trusted
-        assert wrong.uplink_trusted
+        assert not wrong.trusted("image")
+        assert wrong.trusted("uplink")
     for wrong in (replace(GOOD, uplink=0.94), replace(GOOD, uplink_level_db=-2.1)):
-        assert wrong.image_trusted
-        assert not wrong.uplink_trusted
-    assert replace(GOOD, echo=0.5, echo_level_db=-9.0).image_trusted  # its edges
+        assert wrong.trusted("image")
+        assert not wrong.trusted("uplink")
+    assert replace(GOOD, echo=0.5, echo_level_db=-9.0).trusted("image")  # its edges
 
 
 def test_the_limits_are_those_of_the_literature() -> None:

@@ -27,6 +27,7 @@ from estimator.estimate import Estimate, Mirror, UserEstimate
 from estimator.localization import locate
 from scenes.library import load_scenario
 from simulator.simulation import simulate
+from validation.calibration import normalised_square
 from validation.metrics import nearest_wall, wall_error
 from validation.truth import Truth, truth_from_dataset
 
@@ -352,7 +353,7 @@ def errors(
     if answer.position is None or answer.covariance is None:
         return None, None
     error = (answer.position - truth)[:2]
-    square = float(error @ np.linalg.solve(answer.covariance[:2, :2], error))
+    square = normalised_square(error, answer.covariance[:2, :2])
     return float(np.linalg.norm(error)), square
 
 

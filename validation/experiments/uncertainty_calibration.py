@@ -24,6 +24,7 @@ from estimator.estimate import Mirror
 from estimator.localization import locate
 from scenes.library import load_scenario
 from simulator.simulation import simulate
+from validation.calibration import coverage, normalised_square
 from validation.truth import Truth, truth_from_dataset
 
 TRIALS = 200
@@ -72,7 +73,7 @@ def calibration(scenario: str, overrides: tuple[str, ...], *, trials: int) -> Ca
             continue
         error = (user.position - truth.user_position[user.name])[:2]
         errors.append(float(np.linalg.norm(error)))
-        squares.append(float(error @ np.linalg.solve(user.covariance[:2, :2], error)))
+        squares.append(normalised_square(error, user.covariance[:2, :2]))
     return Calibration(
         found=len(errors),
         trials=trials,
@@ -92,16 +93,18 @@ def wall_square(mirror: Mirror, truth: Truth, name: str) -> float:
     middle = 0.5 * (mirror.start + mirror.end)
     away = (middle - truth.wall_start[name])[:2]
     error = np.array([tilt, away[0] * true[1] - away[1] * true[0]])
-    return float(error @ np.linalg.solve(mirror.covariance, error))
+    return normalised_square(error, mirror.covariance)
 
 
 def table_row(name: str, result: Calibration) -> str:
     """Describe one variant in a line."""
     errors = 1e3 * result.errors
+    held = coverage(result.squares, probability=0.95, axes=2)
     return (
         f"{name:8s} found {result.found}/{result.trials}; mean of e'C⁻¹e "
         f"{result.squares.mean():.2f} (2 expected); 95 % region holds "
-        f"{100 * result.held(0.95):.1f} %, 99.9 % region {100 * result.held(0.999):.1f} %; "
+        f"{100 * held.share:.1f} % (true share {100 * held.low:.1f} to {100 * held.high:.1f} %), "
+        f"99.9 % region {100 * result.held(0.999):.1f} %; "
         f"error median {np.median(errors):.4f}, worst {errors.max():.4f} mm; wall: mean "
         f"{result.wall_squares.mean():.2f}, 95 % region "
         f"{100 * np.mean(result.wall_squares < chi2.ppf(0.95, 2)):.1f} %"

@@ -1,0 +1,150 @@
+"""What simple receivers measure of a pilot: strength, time and angle of arrival."""
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.optimize import minimize_scalar
+
+from estimator.measurement import Uplink
+
+FIRST_PATH_DB = -12.0
+"""Level over the strongest path from which an earlier one counts as the first; Hann's window
+keeps sidelobes below -31 dB. [dB]"""
+DETECTION_DB = 13.0
+"""Peak over the median of the profile from which a path counts as heard: noise alone reaches
+that in one of some thousand cells. [dB]"""
+OVERSAMPLING = 8
+
+
+def strength_db(pilot: Uplink) -> float:
+    """Return the received signal strength: mean power over antennas and band [dB]."""
+    return float(10 * np.log10(np.mean(np.abs(pilot.samples) ** 2)))
+
+
+def first_arrival(
+    samples: Complex[np.ndarray, " freqs"],
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    longest: float | None = None,
+) -> float | None:
+    """Return the length of the earliest path that is not much weaker than the strongest [m].
+
+    Parameters
+    ----------
+    samples, frequencies
+        Of one antenna, on any grid. [-], [Hz]
+    longest
+        Longest path; ``None``: the unambiguous one of the smallest step. [m]
+
+    Returns
+    -------
+    ``None`` if nothing stands out of the noise.
+    """
+    reach = longest or float(speed_of_light / np.diff(frequencies).min())
+    cell = float(speed_of_light / np.ptp(frequencies))
+    lengths = np.arange(0.0, reach, cell / OVERSAMPLING)
+    tapered = samples * np.hanning(len(samples) + 2)[1:-1]
+    middle = float(frequencies.mean())
+
+    def level(length: Float[np.ndarray, " lengths"]) -> Float[np.ndarray, " lengths"]:
+        turns = np.outer(length, (frequencies - middle) / speed_of_light)
+        return np.asarray(np.abs(np.exp(2j * np.pi * turns) @ tapered))
+
+    profile = level(lengths)
+    if profile.max() < 10 ** (DETECTION_DB / 20) * np.median(profile):
+        return None
+    least = 10 ** (FIRST_PATH_DB / 20) * profile.max()
+    peaks = np.flatnonzero(
+        (profile[1:-1] >= profile[:-2]) & (profile[1:-1] > profile[2:]) & (profile[1:-1] >= least)
+    )
+    if not peaks.size:
+        return None
+    coarse = float(lengths[peaks[0] + 1])
+    best = minimize_scalar(
+        lambda length: -float(level(np.array([length]))[0]),
+        bounds=(coarse - cell / OVERSAMPLING, coarse + cell / OVERSAMPLING),
+        method="bounded",
+        options={"xatol": 1e-7},
+    )
+    return float(best.x)
+
+
+def first_sparse_arrival(
+    samples: Complex[np.ndarray, " freqs"],
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    most: int = 6,
+) -> float | None:
+    """Return the same for a band with gaps: the profile is a sum of a few paths [m].
+
+    Orthogonal matching pursuit: the strongest path of what is left, refined off the grid, joins
+    the others, and all amplitudes are fitted anew.
+
+    Parameters
+    ----------
+    samples, frequencies
+        See :func:`first_arrival`.
+    most
+        Number of paths at which the search ends.
+    """
+    cell = float(speed_of_light / np.ptp(frequencies))
+    lengths = np.arange(0.0, speed_of_light / np.diff(frequencies).min(), cell / OVERSAMPLING)
+    turns = 2j * np.pi * (frequencies - frequencies.mean()) / speed_of_light
+    grid = np.exp(np.outer(lengths, turns))
+    found: list[float] = []
+    left, gains = samples, np.zeros(0, dtype=np.complex128)
+    while len(found) < most:
+        profile = np.abs(grid @ left)
+        if profile.max() < 10 ** (DETECTION_DB / 20) * np.median(profile):
+            break
+        for length in found:
+            profile[np.abs(lengths - length) < cell] = 0.0
+        start, rest = float(lengths[int(np.argmax(profile))]), left
+        best = minimize_scalar(
+            lambda length, rest=rest: -float(np.abs(np.exp(turns * length) @ rest)),
+            bounds=(start - cell / OVERSAMPLING, start + cell / OVERSAMPLING),
+            method="bounded",
+            options={"xatol": 1e-7},
+        )
+        found.append(float(best.x))
+        waves = np.exp(-np.outer(turns, found))
+        gains = np.linalg.lstsq(waves, samples, rcond=None)[0]
+        left = samples - waves @ gains
+    if not found:
+        return None
+    levels = np.abs(gains)
+    strong = levels >= 10 ** (FIRST_PATH_DB / 20) * levels.max()
+    return float(np.array(found)[strong].min())
+
+
+def plane_wave_angle(pilot: Uplink) -> float:
+    """Return the angle of the strongest plane wave from the array's axis, band averaged [rad].
+
+    The maximum of Bartlett's spectrum, off the grid; the array's own axis runs from its first
+    element to its last.
+    """
+    axis = pilot.positions[-1] - pilot.positions[0]
+    places = (pilot.positions - pilot.positions.mean(axis=0)) @ axis / np.linalg.norm(axis)
+    wavenumbers = 2 * np.pi * pilot.frequencies / speed_of_light
+
+    def power(cosine: float) -> float:
+        steering = np.exp(-1j * cosine * np.outer(places, wavenumbers))
+        return float((np.abs((steering * pilot.samples).sum(axis=0)) ** 2).sum())
+
+    count = max(8 * len(places), 64)
+    cosines = np.linspace(-1.0, 1.0, count + 1)
+    best = float(cosines[int(np.argmax([power(float(cosine)) for cosine in cosines]))])
+    step = 2.0 / count
+    found = minimize_scalar(
+        lambda cosine: -power(float(cosine)),
+        bounds=(max(best - step, -1.0), min(best + step, 1.0)),
+        method="bounded",
+        options={"xatol": 1e-8},
+    )
+    return float(np.arccos(found.x))
+
+
+def array_axis_angle(pilot: Uplink) -> float:
+    """Return the azimuth of an array's axis from +x [rad]."""
+    axis = pilot.positions[-1] - pilot.positions[0]
+    return float(np.arctan2(axis[1], axis[0]))

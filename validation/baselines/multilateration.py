@@ -1,0 +1,48 @@
+"""Positions from distances: least squares, with or without the user's clock."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares
+
+REACH = 2.5
+"""Half width of the square around the anchors in which positions are sought. [m]"""
+STARTS = 4
+"""Places on each side of the square from which the search descends. [-]"""
+
+
+def multilaterate(
+    anchors: Float[np.ndarray, "anchors 2"],
+    distances: Float[np.ndarray, " anchors"],
+    *,
+    clock_known: bool = True,
+    relative: bool = False,
+) -> Float[np.ndarray, " 2"]:
+    """Find the place at given distances from anchors, as least squares has it.
+
+    Parameters
+    ----------
+    anchors
+        [m]
+    distances
+        [m]
+    clock_known
+        Otherwise all distances are too long by the same unknown amount: their differences count.
+    relative
+        Whether the distances' relative errors are equal, as those of signal strengths are.
+    """
+    anchors, centre = np.asarray(anchors), np.mean(anchors, axis=0)
+
+    def residuals(place: Float[np.ndarray, " n"]) -> Float[np.ndarray, " anchors"]:
+        lengths = np.linalg.norm(place[:2] - anchors, axis=-1)
+        if relative:
+            return np.asarray(np.log(lengths / distances))
+        left = lengths - distances
+        return np.asarray(left if clock_known else left - left.mean())
+
+    side = np.linspace(-REACH, REACH, STARTS)
+    fits = [
+        least_squares(residuals, centre + np.array([x, y]), xtol=1e-12, ftol=1e-12)
+        for x in side
+        for y in side
+    ]
+    return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)

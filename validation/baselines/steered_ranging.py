@@ -1,0 +1,54 @@
+"""An angle of arrival at a low band steers a mmWave beam, which measures the range.
+
+Stands for hybrids of a low and a high band: the low band finds the direction, whence the high
+band needs no search of beams (Nitsche et al., "Steering with eyes closed", INFOCOM 2015, ranging
+added). Infrastructure: one base station with a second array of 8 elements for 28 GHz, half a
+wavelength apart (37 mm), beside ours, of which 32 elements form the plane-wave beams of a codebook
+λ/2D apart (all 260 would be in the near field out to 29 m, where such beams blur). The direction
+is that of the best beam, interpolated between its neighbours' powers; the position is where the
+range lies along it. It assumes that the path it finds is direct.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.constants import speed_of_light
+
+from scenes.radio import Radio
+from validation.baselines.arrivals import first_arrival, plane_wave_angle
+from validation.baselines.room import Fix, Room
+
+LOW = Radio(start_ghz=27.5, stop_ghz=28.5, points=11)
+LOW_ELEMENTS = 8
+BEAM_ELEMENTS = 32
+
+
+def steered_ranging(room: Room) -> Fix:
+    """Find the direction at the low band, the best beam near it, and the range in that beam."""
+    own = room.own_array
+    low = replace(own, elements=LOW_ELEMENTS, spacing=LOW.shortest_wavelength / 2)
+    coarse = plane_wave_angle(room.pilot(low, radio=LOW))
+    pilot = room.pilot(replace(own, elements=min(BEAM_ELEMENTS, own.elements)))
+    count = len(pilot.positions)
+    width = speed_of_light / LOW.centre_frequency / (LOW_ELEMENTS * low.spacing)
+    step = speed_of_light / float(pilot.frequencies.mean()) / (2 * count * own.spacing)
+    near = step * np.round(np.cos(coarse) / step + np.arange(-64, 65))
+    beams = near[(np.abs(near - np.cos(coarse)) <= width / 2 + step) & (np.abs(near) < 1)]
+    along = (np.arange(count) - (count - 1) / 2) * own.spacing
+    wavenumbers = 2 * np.pi * pilot.frequencies / speed_of_light
+    outputs = [
+        (np.exp(-1j * beam * np.outer(along, wavenumbers)) * pilot.samples).sum(axis=0)
+        for beam in beams
+    ]
+    powers = np.array([float((np.abs(output) ** 2).sum()) for output in outputs])
+    best = int(np.argmax(powers))
+    cosine = float(beams[best])
+    if 0 < best < len(beams) - 1:
+        before, here, after = np.log(powers[best - 1 : best + 2])
+        cosine += step * float(0.5 * (before - after) / (before - 2 * here + after))
+    length = first_arrival(outputs[best], pilot.frequencies)
+    if length is None:
+        return Fix(position=None, reason="no beam hears the user")
+    axis = pilot.positions[-1] - pilot.positions[0]
+    angle = np.arctan2(axis[1], axis[0]) + np.arccos(cosine)
+    return Fix(position=own.position + length * np.array([np.cos(angle), np.sin(angle)]))

@@ -1,0 +1,16 @@
+"""Differences of the time of arrival at several receivers.
+
+Stands for hyperbolic positioning (after Chan and Ho, IEEE Trans. Signal Process. 1994): the
+receivers share a clock, the user needs none. Beyond ours it needs three more receivers (at
+:data:`validation.baselines.room.ANCHORS`), synchronised to picoseconds. It assumes that the first
+path is the direct one. The compact receivers make hyperbolas cross at a flat angle: range is
+known far worse than direction.
+"""
+
+from validation.baselines.room import Fix, Room
+from validation.baselines.toa_trilateration import toa_trilateration
+
+
+def tdoa(room: Room) -> Fix:
+    """Measure the first path at each receiver, and use the differences alone."""
+    return toa_trilateration(room, clock_known=False)

@@ -1,0 +1,183 @@
+r"""Smooth curves of a conductor's cross-section, on the grids that integrate over them.
+
+A curve :math:`\mathbf r(\theta)` is sampled at equal steps :math:`h` of a periodic parameter,
+so that the trapezoidal rule is spectrally accurate.
+
+A closed contour is periodic by itself. On an open strip the current grows as the inverse
+square root towards an edge. With
+
+.. math:: s = \frac{L}{2} \Bigl(1 + \frac{\arcsin(\alpha\cos\theta)}{\arcsin\alpha}\Bigr),
+          \qquad 0 < \theta < \pi
+
+over the arc length [1]_, the current per step of :math:`\theta` is a smooth, even, periodic
+function. :math:`\alpha = 1/\cosh\delta` close to 1 spaces the points evenly all over the strip
+but for some at its ends; :math:`\delta` is the half width of the strip in which the map is
+analytic, and :math:`N\delta` the digits of the rule over N points.
+
+References
+----------
+.. [1] D. Kosloff, H. Tal-Ezer, "A modified Chebyshev pseudospectral method with an O(1/N) time
+   step restriction", J. Comput. Phys. 104, 1993.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+
+EDGE_DIGITS = 16.0
+r""":math:`N\delta`: the rule's error at the edges is about e to minus this, 1e-7. [-]"""
+
+FINER = 4
+"""Points at which the arc length is integrated, for each point of a profile. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contour:
+    """A conductor's curve, sampled at equal steps of its parameter.
+
+    The points of an open strip lie half a step from its ends, where the parameter turns back.
+    """
+
+    points: Float[np.ndarray, "points 2"]  # [m]
+    normals: Float[np.ndarray, "points 2"]  # to the right of the way: outward if counter-clockwise
+    speeds: Float[np.ndarray, " points"]  # |dr/dθ| [m]
+    curvatures: Float[np.ndarray, " points"]  # positive if convex seen along the normal [1/m]
+    step: float  # h, of the parameter [rad]
+    closed: bool
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.speeds)
+
+    @property
+    def weights(self) -> Float[np.ndarray, " points"]:
+        """Arc length of each point's step. [m]."""
+        return self.speeds * self.step
+
+    @property
+    def spacing(self) -> float:
+        """Largest step of arc length. [m]."""
+        return float(self.weights.max())
+
+
+def open_strip(profile: Float[np.ndarray, "vertices axis"], *, spacing: float) -> Contour:
+    """Sample an open strip through the points of a profile.
+
+    The curve is the cubic spline through the points, over the profile's chords; points that
+    resolve the roughness leave it no freedom.
+
+    Parameters
+    ----------
+    profile
+        At least four points from end to end; a third coordinate is left out. [m]
+    spacing
+        Arc length between points of the grid, at most. [m]
+
+    Raises
+    ------
+    ValueError
+        If points are missing or coincide, or the spacing is not positive.
+    """
+    chords = np.hypot(*np.diff(profile[:, :2], axis=0).T)
+    if len(profile) < 4 or not np.all(chords > 0):
+        raise ValueError(
+            f"a strip through {len(profile)} points, the shortest step "
+            f"{chords.min(initial=np.inf):g} m: at least four points that differ are needed"
+        )
+    _check_spacing(spacing)
+    ends = np.concatenate([[0.0], np.cumsum(chords)])
+    curve = CubicSpline(ends, profile[:, :2])
+    slope = curve.derivative()
+    fine = np.interp(np.arange(FINER * (len(ends) - 1) + 1) / FINER, np.arange(len(ends)), ends)
+    length = CubicSpline(fine, np.hypot(*slope(fine).T)).antiderivative()(fine)
+    parameter = CubicSpline(length, fine)
+    total = float(length[-1])
+    # The middle is sampled by L/(N − 2·EDGE_DIGITS/π): the rest is spent on the edges.
+    count = int(np.ceil(total / spacing + 2 * EDGE_DIGITS / np.pi))
+    alpha = 1 / np.cosh(EDGE_DIGITS / count)
+    step = np.pi / count
+    # From the first vertex to the last: cos θ falls, so θ runs from π to 0.
+    angle = np.pi - step * (np.arange(count) + 0.5)
+    place = np.arcsin(alpha * np.cos(angle)) / np.arcsin(alpha)
+    rate = alpha * np.sin(angle) / np.sqrt(1 - (alpha * np.cos(angle)) ** 2) / np.arcsin(alpha)
+    along = 0.5 * total * (1 + place)
+    where = parameter(along)
+    tangent, bend = slope(where), curve.derivative(2)(where)
+    pace = np.hypot(*tangent.T)
+    return Contour(
+        points=np.asarray(curve(where)),
+        normals=np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) / pace[:, None],
+        speeds=np.asarray(0.5 * total * rate * pace * parameter(along, 1)),
+        curvatures=_curvature(tangent, bend),
+        step=step,
+        closed=False,
+    )
+
+
+def closed_contour(
+    curve: Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, "derivatives n 2"]], count: int
+) -> Contour:
+    """Sample a smooth closed curve.
+
+    Parameters
+    ----------
+    curve
+        From the parameter, 0 to 2π counter-clockwise, to place, first and second derivative.
+    count
+        Points.
+
+    Raises
+    ------
+    ValueError
+        If the curve runs clockwise: its normals would look inward.
+    """
+    angle = 2 * np.pi * np.arange(count) / count
+    points, tangent, bend = curve(angle)
+    area = float(np.sum(points[:, 0] * tangent[:, 1] - points[:, 1] * tangent[:, 0]))
+    if not area > 0:
+        raise ValueError("the closed curve runs clockwise; turn it, so that its normals look out")
+    speeds = np.hypot(*tangent.T)
+    return Contour(
+        points=points,
+        normals=np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) / speeds[:, None],
+        speeds=speeds,
+        curvatures=_curvature(tangent, bend),
+        step=2 * np.pi / count,
+        closed=True,
+    )
+
+
+def circle(centre: Float[np.ndarray, " 2"], radius: float, *, spacing: float) -> Contour:
+    """Sample a circle.
+
+    Parameters
+    ----------
+    centre, radius
+        [m].
+    spacing
+        Arc length between points, at most. [m]
+    """
+    _check_spacing(spacing)
+
+    def curve(angle: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3 n 2"]:
+        ray = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        along = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+        return np.stack([centre + radius * ray, radius * along, -radius * ray])
+
+    return closed_contour(curve, max(int(np.ceil(2 * np.pi * radius / spacing)), 32))
+
+
+def _curvature(
+    tangent: Float[np.ndarray, "n 2"], bend: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, " n"]:
+    turning = tangent[:, 0] * bend[:, 1] - tangent[:, 1] * bend[:, 0]
+    return np.asarray(turning / np.hypot(*tangent.T) ** 3)
+
+
+def _check_spacing(spacing: float) -> None:
+    if not spacing > 0:
+        raise ValueError(f"spacing = {spacing} m must be positive; give a length")

@@ -1,0 +1,131 @@
+"""Noise-free measurements, kept: what does not depend on noise is simulated once.
+
+A measurement is what the antennas would receive (the scene, its roughness, where they truly
+stand) and what the receiver makes of it (noise, drift, clock, converter). The first takes seconds
+and is stored under a digest of all that it depends on, the code included; the second is drawn
+anew. Together they are what :func:`simulator.simulation.simulate` gives, bit for bit.
+"""
+
+import fcntl
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
+from estimator.storage import read_measurement, write_measurement
+from scenes.impairments import Impairments
+from scenes.library import scenario_to_toml
+from scenes.scenario import Noise, Scenario
+from simulator.code_version import code_digest, package_versions
+from simulator.dataset_config import content_text
+from simulator.receiver import received
+
+
+def without_receiver(scenario: Scenario) -> Scenario:
+    """Return the scenario with a receiver that adds nothing; its antennas stand where they did."""
+    jitter = scenario.impairments.position_jitter_mm
+    quiet = {"noise": Noise(), "impairments": Impairments(position_jitter_mm=jitter)}
+    return scenario.model_copy(update=quiet)
+
+
+def noise_free_key(scenario: Scenario, *, seed: int, sample: int) -> str:
+    """Return a digest of all that a noise-free measurement depends on."""
+    return content_key(
+        without_receiver(scenario), seed=seed, sample=sample, packages=("scenes", "simulator")
+    )
+
+
+def content_key(scenario: Scenario, *, seed: int, sample: int, packages: tuple[str, ...]) -> str:
+    """Return a digest of a scenario, its files, the realisation and the code that computes.
+
+    Parameters
+    ----------
+    scenario, seed, sample
+        What is computed.
+    packages
+        Ours that do so.
+    """
+    content = {
+        "scenario": content_text(tomllib.loads(scenario_to_toml(scenario))),
+        "seed": seed,
+        "sample": sample,
+        "versions": package_versions(),
+        "code": code_digest(packages),
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def noise_free(scenario: Scenario, *, seed: int, sample: int, folder: Path) -> Measurement:
+    """Return a scenario's noise-free measurement, from the folder if it is there.
+
+    Parameters
+    ----------
+    scenario, seed, sample
+        As for :func:`simulator.simulation.simulate`; the receiver's part is left out.
+    folder
+        Where such measurements are kept. A store that cannot be read is made again; two
+        processes that need the same one do not both make it.
+    """
+    path = folder / f"{noise_free_key(scenario, seed=seed, sample=sample)}.zarr"
+    with _locked(path.with_suffix(".lock")):
+        if path.exists():
+            try:
+                return read_measurement(path)
+            except MeasurementError:
+                pass  # such as half of one, after a power cut
+        from simulator.simulation import simulate  # Sionna's import takes seconds
+
+        made = simulate(without_receiver(scenario), seed=seed, sample=sample).measurement
+        write_measurement(path, made)
+        return made
+
+
+def with_receiver(quiet: Measurement, scenario: Scenario, *, seed: int, sample: int) -> Measurement:
+    """Return what the scenario's receiver makes of a noise-free measurement.
+
+    Parameters
+    ----------
+    quiet
+        As :func:`noise_free` returns it.
+    scenario, seed, sample
+        As given there; noise, drift, clock and converter are the scenario's.
+    """
+    elements, frequencies = scenario.base_station.element_positions, scenario.radio.frequencies
+    silent = np.zeros((len(elements), len(frequencies)), dtype=np.complex128)
+    pilots = {uplink.user: uplink.samples for uplink in quiet.uplinks}
+    signals = {"echo": silent if quiet.echo is None else quiet.echo.samples}
+    signals |= {f"uplink/{name}": pilots.get(name, silent) for name in scenario.users}
+    recorded = received(signals, scenario, seed=seed, sample=sample)
+    flaws = scenario.impairments
+    echo = quiet.echo
+    if "echo" in recorded:
+        echo = Echo(
+            samples=recorded["echo"],
+            positions=elements,
+            frequencies=frequencies,
+            transmit_positions=scenario.base_station.transmit_positions(elements),
+        )
+    return replace(
+        quiet,
+        echo=echo,
+        uplinks=tuple(
+            Uplink(samples=pilot, positions=elements, frequencies=frequencies, user=name)
+            for name in scenario.users
+            if (pilot := recorded.get(f"uplink/{name}")) is not None
+        ),
+        clock_offset=flaws.clock_offset if flaws.clock_known else None,
+    )
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
