@@ -90,7 +90,7 @@ def export_netcdf(store: Path, file: Path, *, samples: Sequence[int] | None = No
                 if dimension not in group.dimensions:
                     group.createDimension(dimension, length)
             text = one.array.dtype.kind == "T"
-            kind = str if text else one.array.dtype
+            kind = str if text else np.dtype(one.array.dtype.str[1:])  # in this machine's order
             packed = {} if text or not one.shape else {"compression": "zlib", "complevel": 1}
             variable = group.createVariable(one.name, kind, one.dimensions, **packed)
             variable.setncatts(_attributes(one.array.attrs.asdict()))

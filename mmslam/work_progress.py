@@ -92,7 +92,7 @@ class WorkProgress:
         return line
 
 
-def told_time(seconds: float) -> str:
+def told_time(seconds: int | float) -> str:
     """Say a duration so that it can be read: ``"3 h 20 min"``."""
     if seconds < 60:
         return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
@@ -105,7 +105,7 @@ def told_time(seconds: float) -> str:
     return f"{hours // 24} d {hours % 24} h"
 
 
-def told_size(size: float) -> str:
+def told_size(size: int | float) -> str:
     """Say a number of bytes so that it can be read: ``"1.5 GiB"``."""
     units = ("B", "KiB", "MiB", "GiB", "TiB", "PiB")
     power = 0

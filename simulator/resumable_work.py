@@ -234,7 +234,6 @@ def dask_setup(worker: Any) -> None:
 @functools.cache
 def compute_in_one_thread() -> None:
     """Compute in one thread: Dr.Jit takes all cores in every worker else."""
-    import estimator  # noqa: F401  points Dr.Jit to an LLVM that works before anything loads it
     from estimator import engine
 
     if engine.backend() == "llvm":

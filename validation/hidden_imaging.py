@@ -183,7 +183,7 @@ def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
             name="objects missed",
             stated="every ghost folds back to its object",
             measured=float(sum(len(one.missed) for one in results)),
-            high=0,
+            high=0.0,
             origin="all of them are there in every realisation",
         ),
         Row(
@@ -221,7 +221,7 @@ def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
             name=f"false targets above {FALSE_DB:g} dB of the weakest true one",
             stated="thesis' figure shows none",
             measured=float(sum(one.false for one in results)),
-            high=0,
+            high=0.0,
             origin="what an eye would take for an object",
         ),
     )

@@ -34,21 +34,21 @@ PLANTED = (
         file="simulator/free_space.py",
         right="phase = np.exp(-2j * np.pi * np.remainder(",
         wrong="phase = np.exp(+2j * np.pi * np.remainder(",
-        claims=("free_space", "line_of_sight"),
+        claims=("points", "line_of_sight"),
     ),
     PlantedError(
         name="sign of the phase, facets in the simulator",
         file="simulator/frequency_sum.py",
         right="carrier = np.exp(-2j * np.pi * (turns - np.round(turns)))",
         wrong="carrier = np.exp(+2j * np.pi * (turns - np.round(turns)))",
-        claims=("canonical_bodies", "full_wave_wall", "slam_2d"),
+        claims=("canonical_bodies", "full_wave_wall", "fig04_09_slam"),
     ),
     PlantedError(
         name="sign of the phase in the estimator",
         file="estimator/range_profiles.py",
         right='table = scipy.fft.ifft(spectrum, axis=1, norm="forward"',
         wrong='table = scipy.fft.fft(spectrum, axis=1, norm="backward"',
-        claims=("point_image", "pilot_range", "slam_2d"),
+        claims=("points", "pilot_range", "fig04_09_slam"),
     ),
     PlantedError(
         name="image plane 1 mm off in the simulator",
@@ -63,14 +63,14 @@ PLANTED = (
         right="((points - start) @ normal)[..., None] * normal",
         # Directions are mirrored about the origin: they are left alone.
         wrong="((points - start) @ normal + 1e-3 * bool(np.any(start)))[..., None] * normal",
-        claims=("slam_2d",),
+        claims=("fig04_09_slam",),
     ),
     PlantedError(
         name="one-way for two-way range",
         file="estimator/range_profiles.py",
         right="two_way = isinstance(data, Echo) and data.transmit_positions is None",
         wrong="two_way = False",
-        claims=("point_image", "slam_2d"),
+        claims=("points", "fig04_09_slam"),
     ),
     PlantedError(
         name="missing Jacobian of the Stolt step",
@@ -92,7 +92,7 @@ PLANTED = (
         right="    return np.asarray(echo + ghosts)\n",
         wrong="    turns = np.random.default_rng(0).random((len(echo), 1))\n"
         "    return np.asarray((echo + ghosts) * np.exp(2j * np.pi * turns))\n",
-        claims=("canonical_bodies", "slam_2d"),
+        claims=("canonical_bodies", "fig04_09_slam"),
     ),
 )
 

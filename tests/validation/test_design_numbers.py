@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from validation.experiments.eq02_design_numbers import DesignNumbers, draw, measure, rows
+from validation.design_numbers import DesignNumbers
+from validation.experiments.eq02_design_numbers import draw, measure, rows
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ def test_errors_far_above_or_below_the_bound_are_refused() -> None:
     found = free_space(False, 6, bandwidth=20e9, elements=24)
     for factor in (2.0, 0.0):
         wrong = replace(found, measured=factor * found.bound, trials=100, answered=100)
-        with pytest.raises(RuntimeError, match="claimed at most 1.5"):
+        with pytest.raises(RuntimeError, match=r"claimed at most 1\.5"):
             check([wrong])
     with pytest.raises(RuntimeError, match="5 of 6 answered"):
         check([replace(found, answered=5)])

@@ -17,7 +17,7 @@ from validation.baselines.arrivals import plane_wave_angle, strength_db
 from validation.baselines.room import ANCHORS, Fix, Room
 
 ELEMENTS = 16
-POINTS = 5
+POINTS = 16
 """Frequencies of the fingerprint, over our band. [-]"""
 PITCH = 0.15
 """Distance of surveyed places. [m]"""

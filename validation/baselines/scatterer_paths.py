@@ -114,11 +114,18 @@ def departure(
 
 
 def intersect(station: Float[np.ndarray, " 2"], paths: list[BouncePath]) -> Fix:
-    """Find the user by a direct path, or where the lines of bounced ones intersect."""
+    """Find the user by the first direct path, or where the lines of bounced ones intersect.
+
+    Parameters
+    ----------
+    station
+        Where the base station is. [m]
+    paths
+        The strongest first.
+    """
     direct = [path for path in paths if path.arrives_from @ path.leaves_to < -np.cos(DIRECT)]
     if direct:
-        nearest = min(direct, key=lambda path: path.length)
-        return Fix(position=station + nearest.length * nearest.arrives_from)
+        return Fix(position=station + direct[0].length * direct[0].arrives_from)
     if len(paths) < 2:
         return Fix(position=None, reason="one bounced path leaves a line of places")
     normal, right = np.zeros((2, 2)), np.zeros(2)

@@ -1,13 +1,23 @@
 """All claims, by what they are about."""
 
 from validation.claim import Claim
-from validation.claims import closed_forms, full_wave, imaging, propagation, scenarios
+from validation.claims import (
+    closed_forms,
+    full_wave,
+    imaging,
+    limits,
+    propagation,
+    scenarios,
+    thesis,
+)
 
 ALL_CLAIMS: tuple[Claim, ...] = (
     *closed_forms.CLAIMS,
     *propagation.CLAIMS,
     *imaging.CLAIMS,
     *full_wave.CLAIMS,
+    *thesis.CLAIMS,
     *scenarios.CLAIMS,
+    *limits.CLAIMS,
 )
 """In the order in which they are told: physics first, then what is built on it."""

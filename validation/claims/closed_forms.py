@@ -1,13 +1,11 @@
-"""The simulator against closed forms: points in free space, canonical bodies, rough plates."""
+"""The simulator against closed forms: canonical bodies, rough plates."""
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Measurement
-from scenes.library import load_scenario
 from scenes.rough_surface import rough_sheet
-from scenes.scenario import Scenario, parse_scenario
+from scenes.scenario import parse_scenario
 from simulator.physical_optics import scattered
 from simulator.simulation import simulate
 from validation.canonical_scatterers import (
@@ -18,70 +16,8 @@ from validation.canonical_scatterers import (
     ports,
 )
 from validation.claim import Claim, Effort, Finding, Row, Tell
-from validation.point_scatterer import point_echo, point_uplink
 
-BAND_POINTS = 101
 COHERENT_LEVELS = (0.0, 0.3, 0.6, 0.9, 1.2)  # k·rms·cosθ of the rough plates
-
-
-def free_space(effort: Effort, tell: Tell) -> Finding:
-    """Compare simulated echoes and pilots of points with their closed forms."""
-    rows = []
-    for number, dimensions in enumerate((2, 3)):
-        scenario = _points(dimensions)
-        measurement = simulate(scenario, seed=0).measurement
-        for name, error in zip(("echo", "pilot"), _errors(scenario, measurement), strict=True):
-            rows.append(
-                Row(
-                    name=f"{name} in {dimensions} dimensions, relative error",
-                    stated="closed form: the radar equation, exp(−j2kR); Friis, exp(−jkR)",
-                    measured=error,
-                    high=1e-9,
-                    origin="rounding of phases of 1e4 radians in double precision: 1e-12 each",
-                )
-            )
-        tell(number + 1, 2)
-    return Finding(rows=rows)
-
-
-def _points(dimensions: int) -> Scenario:
-    changes = [
-        f"radio.points={BAND_POINTS}",
-        "users.user.position_m=[0.3, 0.6]",
-        "noise.snr_db=inf",
-        f"dimensions={dimensions}",
-    ]
-    if dimensions == 3:
-        changes += ["base_station.elements=[16, 12]", "points.near.position_m=[0.0, 0.5, 0.1]"]
-    else:
-        changes += ["base_station.elements=64"]
-    # A pilot goes over the points as well: they are faint enough not to be felt by it.
-    changes += [f"points.{name}.rcs_m2=1e-28" for name in ("near", "right", "left")]
-    return load_scenario("point_scatterers", changes)
-
-
-def _errors(scenario: Scenario, measurement: Measurement) -> tuple[float, float]:
-    positions = scenario.base_station.element_positions
-    frequencies = scenario.radio.frequencies
-    points = list(scenario.points.values())
-    echo = point_echo(
-        np.stack([point.position for point in points]),
-        positions=positions,
-        frequencies=frequencies,
-        radar_cross_section=np.array([point.rcs_m2 for point in points]),
-    )
-    user = scenario.users["user"].position
-    pilot = point_uplink(user[None], positions=positions, frequencies=frequencies)
-    if measurement.echo is None:
-        raise ValueError("no echo was simulated; give the scenario points")
-    pairs = (
-        (measurement.echo.samples, echo.samples),
-        (measurement.uplinks[0].samples, pilot.samples),
-    )
-    first, second = (
-        float(np.linalg.norm(one - other) / np.linalg.norm(other)) for one, other in pairs
-    )
-    return first, second
 
 
 def bodies(effort: Effort, tell: Tell) -> Finding:
@@ -242,12 +178,6 @@ def coherent_loss(effort: Effort, tell: Tell) -> Finding:
 
 
 CLAIMS = (
-    Claim(
-        key="free_space",
-        title="Points in free space obey the radar equation and Friis' equation",
-        source="closed form",
-        measure=free_space,
-    ),
     Claim(
         key="canonical_bodies",
         title="Facets scatter like plate and cylinder",

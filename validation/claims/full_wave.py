@@ -1,6 +1,7 @@
 """The simulator against full-wave solutions, stored ones and our own."""
 
 from validation.claim import Claim, Effort, Finding, Row, Tell
+from validation.experiments import full_wave_localization, full_wave_roughness, full_wave_wall
 from validation.full_wave_ghosts import LEAST_CORRELATION as GHOST_CORRELATION
 from validation.full_wave_ghosts import MOST_LEVEL_DB as GHOST_LEVEL_DB
 from validation.full_wave_ghosts import compare_ghosts
@@ -9,6 +10,7 @@ from validation.full_wave_reference import (
     MOST_LEVEL_DB,
     compare_with_full_wave,
 )
+from validation.metrics import error_summary
 from validation.reference import ROUGH_WALL, TWO_CYLINDERS
 
 STORED = "2-D method of moments, TM, 0.15 mm rms, 1 mm correlation; checked to 4e-6"
@@ -67,7 +69,123 @@ def ghosts(effort: Effort, tell: Tell) -> Finding:
     )
 
 
+def solver(effort: Effort, tell: Tell) -> Finding:
+    """Check our own method of moments against series, refinement and the stored solution."""
+    found = full_wave_wall.solver_check()
+    tell(1, 1)
+    return Finding(
+        rows=[
+            Row(
+                name="method of moments: field round a cylinder, relative error",
+                stated="Bessel series",
+                measured=found.series_error,
+                high=full_wave_wall.MOST_SERIES_ERROR,
+                origin="spectral quadrature",
+            ),
+            Row(
+                name="method of moments: rough wall of 8 cm, change with twice the unknowns",
+                stated="none",
+                measured=found.refinement,
+                high=full_wave_wall.MOST_REFINEMENT,
+                origin="converged far below what it is compared with",
+            ),
+            Row(
+                name="method of moments: the stored wall of 40 cm, relative difference",
+                stated="an independent code",
+                measured=found.reference_error,
+                high=full_wave_wall.MOST_REFERENCE_ERROR,
+                origin="the wall's profile is interpolated between its 8001 points by either",
+            ),
+        ]
+    )
+
+
+def trust(effort: Effort, tell: Tell) -> Finding:
+    """Compare the simulator with full wave over rms height and correlation length."""
+    found = full_wave_roughness.trust_map()
+    tell(1, 1)
+    rows = []
+    for one in found:
+        statistics = (one.rms_mm, one.correlation_mm)
+        if statistics not in full_wave_roughness.CLAIMS:
+            continue
+        correlation, level = full_wave_roughness.CLAIMS[statistics]
+        what = f"{one.rms_mm:g} mm rms, {one.correlation_mm:g} mm long: image"
+        rows += [
+            Row(
+                name=f"{what}, correlation",
+                stated=f"full wave; {correlation:.3f} was found on another realisation",
+                measured=one.image,
+                low=correlation - full_wave_roughness.CORRELATION_TOLERANCE,
+                origin="scatter between realisations of a short wall",
+            ),
+            Row(
+                name=f"{what}, level over full wave",
+                stated=f"{level:+.1f} dB on another realisation",
+                measured=one.image_level_db,
+                unit="dB",
+                low=level - full_wave_roughness.LEVEL_TOLERANCE_DB,
+                high=level + full_wave_roughness.LEVEL_TOLERANCE_DB,
+                origin="the same",
+            ),
+        ]
+    return Finding(rows=rows, draw=lambda figure: full_wave_roughness.draw_on(figure, found))
+
+
+def located(effort: Effort, tell: Tell) -> Finding:
+    """Locate the user on full-wave data of several realisations."""
+    name = next(iter(full_wave_localization.CASES))
+    trials = full_wave_localization.TRIALS
+    done = []
+
+    def advance(trial: full_wave_localization.Trial) -> None:
+        done.append(trial)
+        tell(len(done), trials)
+
+    found = full_wave_localization.localization(name, trials=trials, advance=advance)
+    errors = error_summary(list(found.errors))
+    return Finding(
+        rows=[
+            Row(
+                name=f"user on full-wave data, {name}: {what} of {trials}",
+                stated="as on simulated data",
+                measured=1e3 * value,
+                unit="mm",
+                high=1e3 * limit,
+                origin="the design's bounds of slam_2d",
+            )
+            for what, value, limit in (
+                ("median", errors.median, full_wave_localization.MOST_MEDIAN),
+                ("worst", errors.worst, full_wave_localization.MOST_WORST),
+            )
+        ]
+    )
+
+
 CLAIMS = (
+    Claim(
+        key="full_wave_solver",
+        title="Our own full-wave solver is right",
+        source="series of a cylinder; its own refinement; the stored reference",
+        measure=solver,
+        minutes=0.5,
+    ),
+    Claim(
+        key="full_wave_roughness",
+        title="How far the simulator can be trusted, by roughness",
+        source="our method of moments, TM",
+        measure=trust,
+        quick=False,
+        minutes=15.0,
+    ),
+    Claim(
+        key="full_wave_localization",
+        title="The estimator on full-wave data, end to end",
+        source="our method of moments, TM",
+        measure=located,
+        quick=False,
+        minutes=45.0,
+    ),
     Claim(
         key="full_wave_wall",
         title="A rough wall's echo and pilots are those of full wave",

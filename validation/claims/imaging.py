@@ -6,11 +6,10 @@ from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import backproject, focus_uplink
-from estimator.measurement import Echo
 from estimator.pixel_grid import PixelGrid
 from estimator.range_migration import range_migration
 from validation.claim import Claim, Effort, Finding, Row, Tell
-from validation.experiments.fig04_angle_spectra import TOLERANCE_DEG, draw, spectra_of
+from validation.experiments import simulator_on_points
 from validation.point_scatterer import point_echo, point_uplink
 
 BAND = np.linspace(220e9, 295e9, 401)
@@ -26,109 +25,6 @@ def array(count: int, length: float = LENGTH) -> Float[np.ndarray, "positions 3"
     positions = np.zeros((count, 3))
     positions[:, 0] = (np.arange(count) - (count - 1) / 2) * length / count
     return positions
-
-
-def points_in_the_image(effort: Effort, tell: Tell) -> Finding:
-    """Image random points: position, −3 dB widths, phase and level, in the plane and in space."""
-    rng = np.random.default_rng(8)
-    trials = 40 if effort == "full" else 8
-    rows = []
-    for dimensions, positions in ((2, array(260)), (3, _planar())):
-        offsets, widths, phases, levels = [], [], [], []
-        for trial in range(trials):
-            low, high = ([-0.1, 0.4, 0.0], [0.1, 0.75, 0.0])
-            if dimensions == 3:
-                low, high = ([-0.05, 0.3, -0.05], [0.05, 0.5, 0.05])
-            target = rng.uniform(low, high)
-            phase = float(rng.uniform(-np.pi, np.pi))
-            echo = point_echo(
-                target[None],
-                positions=positions,
-                frequencies=BAND,
-                radar_cross_section=np.ones(1),
-                phase=np.array([phase]),
-            )
-            found = _cuts(echo, target, float(np.ptp(positions[:, 0])) * _full(positions))
-            offsets.append(found[0])
-            widths.append(found[1])
-            value = backproject(echo, target[None])[0]
-            phases.append(float(abs(np.degrees(np.angle(value * np.exp(-1j * phase))))))
-            wavelength = speed_of_light / CENTRE
-            expected = wavelength / ((4 * np.pi) ** 1.5 * float(target @ target))
-            levels.append(float(abs(20 * np.log10(abs(value) / expected))))
-            tell(trials * (dimensions - 2) + trial + 1, 2 * trials)
-        where = f"in {dimensions} dimensions"
-        rows += [
-            Row(
-                name=f"position {where}, worst of range and cross-range",
-                stated="where the point is",
-                measured=float(np.max(offsets)),
-                unit="cell",
-                high=0.05,
-                origin="the design's bound for ideal points",
-            ),
-            Row(
-                name=f"−3 dB widths {where}, worst deviation from theory",
-                stated="0.886·c/2B in range, 0.886·λR/(2D cosφ) across",
-                measured=100 * float(np.max(np.abs(widths))),
-                unit="%",
-                high=5.0,
-                origin="the formula is for small apertures, and takes the centre frequency",
-            ),
-            Row(
-                name=f"phase {where}",
-                stated="that of the point",
-                measured=float(np.max(phases)),
-                unit="°",
-                high=5.0,
-                origin="amplitudes vary over aperture and band, the phase does so little",
-            ),
-            Row(
-                name=f"level {where}",
-                stated="that of the radar equation at the centre",
-                measured=float(np.max(levels)),
-                unit="dB",
-                high=0.5,
-                origin="the mean of λ/R² over band and aperture is not that of its centre",
-            ),
-        ]
-    return Finding(rows=rows)
-
-
-def _planar() -> Float[np.ndarray, "positions 3"]:
-    x, z = np.meshgrid(np.arange(24), np.arange(24), indexing="ij")
-    positions = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1) * 1.5e-3
-    return np.asarray(positions - positions.mean(axis=0))
-
-
-def _full(positions: Float[np.ndarray, "positions 3"]) -> float:
-    """Return the length that the elements stand for over that between the outer ones."""
-    count = np.unique(positions[:, 0].round(9)).size
-    return count / (count - 1)
-
-
-def _cuts(
-    echo: Echo, target: Float[np.ndarray, " 3"], length: float
-) -> tuple[float, tuple[float, float]]:
-    """Return the worst offset in cells, and how far both widths are off theory."""
-    distance = float(np.linalg.norm(target))
-    along = target / distance
-    across = np.cross([0.0, 0.0, 1.0], along)
-    across /= np.linalg.norm(across)
-    cosine = float(np.sqrt(1 - (target[0] / distance) ** 2))
-    bandwidth = float(np.ptp(BAND)) * BAND.size / (BAND.size - 1)
-    cells = (
-        HALF_POWER * speed_of_light / (2 * bandwidth),
-        HALF_POWER * speed_of_light / CENTRE * distance / (2 * length * cosine),
-    )
-    steps = np.linspace(-1.0, 1.0, 401)
-    worst, deviations = 0.0, []
-    for direction, cell in zip((along, across), cells, strict=True):
-        cut = np.abs(backproject(echo, target + (steps * cell)[:, None] * direction))
-        worst = max(worst, float(abs(steps[int(cut.argmax())])))
-        wide = steps[cut >= HALF * cut.max()]
-        deviations.append(float(np.ptp(wide)) - 1.0)
-    return worst, (deviations[0], deviations[1])
 
 
 def image_formers(effort: Effort, tell: Tell) -> Finding:
@@ -186,57 +82,6 @@ def image_formers(effort: Effort, tell: Tell) -> Finding:
     return Finding(rows=rows, draw=draw_both)
 
 
-def angle_spectra(effort: Effort, tell: Tell) -> Finding:
-    """Find users at 1.8 and 20 m with the spherical and the plane-wave model."""
-    rows, spectra = [], []
-    for number, (aoa, distance) in enumerate(
-        ((90.0, 1.8), (70.0, 1.8), (90.0, 20.0), (70.0, 20.0))
-    ):
-        found = spectra_of(aoa, distance)
-        spectra.append(found)
-        near, plane = found.error_deg(found.spherical), found.error_deg(found.plane)
-        rows.append(
-            Row(
-                name=f"{aoa:g}° at {distance:g} m, spherical waves",
-                stated="the thesis: on its 0.18° grid",
-                measured=near,
-                unit="°",
-                high=TOLERANCE_DEG,
-                origin="the design's bound after refinement",
-            )
-        )
-        if distance > 10:
-            rows.append(
-                Row(
-                    name=f"{aoa:g}° at {distance:g} m, plane waves",
-                    stated="the thesis: both models agree at 20 m",
-                    measured=plane,
-                    unit="°",
-                    high=TOLERANCE_DEG,
-                    origin="the same",
-                )
-            )
-        elif aoa == 90.0:
-            wide = found.plane > found.plane.max() * HALF
-            rows.append(
-                Row(
-                    name=f"{aoa:g}° at {distance:g} m: width of the plane-wave model's lobe",
-                    stated="smeared: near field",
-                    measured=float(np.ptp(found.grid_deg[wide])),
-                    unit="°",
-                    low=1.0,
-                    origin="the spherical model's lobe is 0.53° wide",
-                )
-            )
-        tell(number + 1, 4)
-
-    def draw_all(figure: Figure) -> None:
-        for ax, one in zip(figure.subplots(2, 2).flat, spectra, strict=True):
-            draw(ax, one)
-
-    return Finding(rows=rows, draw=draw_all)
-
-
 def pilot(effort: Effort, tell: Tell) -> Finding:
     """Focus a closed-form pilot: one way, not two."""
     positions = array(260)
@@ -272,12 +117,22 @@ def pilot(effort: Effort, tell: Tell) -> Finding:
     )
 
 
+def points(effort: Effort, tell: Tell) -> Finding:
+    """Image ideal points, and simulate them."""
+    found = simulator_on_points.measure()
+    tell(1, 1)
+    return Finding(
+        rows=simulator_on_points.rows(found),
+        draw=lambda figure: simulator_on_points.draw(figure, found),
+    )
+
+
 CLAIMS = (
     Claim(
-        key="point_image",
-        title="Points focus where they are, as wide as theory says",
-        source="thesis (2-15), (2-19) as corrected",
-        measure=points_in_the_image,
+        key="points",
+        title="Points focus where they are, as wide as theory says, and are simulated so",
+        source="closed form; thesis (2-15), (2-19) as corrected",
+        measure=points,
         minutes=0.5,
     ),
     Claim(
@@ -291,11 +146,5 @@ CLAIMS = (
         title="Range migration and back-projection form the same image",
         source="thesis (2-13), (2-14) as corrected",
         measure=image_formers,
-    ),
-    Claim(
-        key="angle_spectra",
-        title="Near users need the spherical-wave model, far ones do not",
-        source="thesis figures 4.3, 4.4, 4.6, 4.7",
-        measure=angle_spectra,
     ),
 )

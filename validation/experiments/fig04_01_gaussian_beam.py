@@ -126,7 +126,7 @@ def rows(result: BeamPattern) -> tuple[Row, ...]:
             stated="theory: 0 dB; as printed the sides differ without bound",
             measured=result.unevenness_db,
             unit="dB",
-            high=20 * np.log10(1 + 2 * ACCURACY),
+            high=float(20 * np.log10(1 + 2 * ACCURACY)),
             origin="double precision",
         ),
     )

@@ -244,8 +244,15 @@ def trust_map(
 
 
 def draw(comparisons: tuple[Comparison, ...]) -> Figure:
+    """Draw the map in a figure of its own."""
+    figure = plt.figure(figsize=(14, 8), layout="constrained")
+    draw_on(figure, comparisons)
+    return figure
+
+
+def draw_on(figure: Figure, comparisons: tuple[Comparison, ...]) -> None:
     """Draw the map: six panels with their numbers, and what is trusted within a line."""
-    figure, axes = plt.subplots(2, 3, figsize=(14, 8), layout="constrained")
+    axes = figure.subplots(2, 3)
     titles: tuple[tuple[Part, str], ...] = (
         ("image", "image of the wall, without edges"),
         ("echo", "echo, its edges included"),
@@ -261,7 +268,6 @@ def draw(comparisons: tuple[Comparison, ...]) -> Figure:
         f"{TRUSTED_CORRELATION:g} or more and within {TRUSTED_LEVEL_DB:g} dB. Lower left: Bragg "
         f"scattering ({BRAGG_DB:+.1f} dB); upper left: only the edges echo ({EDGES_DB:+.1f} dB)."
     )
-    return figure
 
 
 def _draw_panel(

@@ -119,10 +119,10 @@ QUICK = Effort(
     trials=10,
     realisations=10,
     snr_db=(0.0, 20.0),
-    bandwidth=(10e9, 75e9),
-    elements=(32, 128),
+    bandwidth=(10e9,),
+    elements=(32,),
     distance=(0.4,),
-    rms=(2e-5, 5e-5),
+    rms=(5e-5,),
 )
 
 
