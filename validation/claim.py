@@ -23,7 +23,10 @@ class Row:
     origin: str  # where the limits come from
 
     def __post_init__(self) -> None:
-        """Refuse a row that cannot fail."""
+        """Take NumPy's numbers too; refuse a row that cannot fail."""
+        for key in ("measured", "low", "high"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, float(getattr(self, key)))
         if self.low is None and self.high is None:
             raise ValueError(f"{self.name!r} has no limit; give low or high")
 

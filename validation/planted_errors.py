@@ -82,9 +82,9 @@ PLANTED = (
     PlantedError(
         name="facets as long as a wavelength",
         file="scenes/facet_spacing.py",
-        right="FACETS_PER_WAVELENGTH = 4",
-        wrong="FACETS_PER_WAVELENGTH = 1",
-        claims=("canonical_bodies", "facet_grid"),
+        right="FACETS_PER_CUTOFF)\n    return spacing",
+        wrong="FACETS_PER_CUTOFF)\n    return shortest_wavelength",
+        claims=("facet_grid",),
     ),
     PlantedError(
         name="random phases at every position",

@@ -15,7 +15,8 @@ import griffe
 _spec = importlib.util.spec_from_file_location(
     "restructured_text", Path(__file__).with_name("restructured_text.py")
 )
-assert _spec is not None and _spec.loader is not None
+assert _spec is not None
+assert _spec.loader is not None
 _restructured_text = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_restructured_text)
 

@@ -4,6 +4,8 @@ Only what the project's equations use is known; anything else is refused, so tha
 where an equation would show wrongly.
 """
 
+# ruff: noqa: RUF001  (letters that look like others are meant)
+
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -34,7 +34,9 @@ which checks every claim and writes its figures and pictures here (see
 class _Blocks(Preprocessor):
     """Fences of the language math."""
 
-    FENCE = re.compile(r"^(?P<indent> *)```math *\n(?P<body>.*?)^ *``` *$", re.DOTALL | re.MULTILINE)
+    FENCE = re.compile(
+        r"^(?P<indent> *)```math *\n(?P<body>.*?)^ *``` *$", re.DOTALL | re.MULTILINE
+    )
 
     def run(self, lines: list[str]) -> list[str]:
         """Replace each by its MathML."""
@@ -50,7 +52,7 @@ class _Blocks(Preprocessor):
 class _Inline(InlineProcessor):
     """Equations within a line, between dollars and backticks."""
 
-    def handleMatch(  # type: ignore[override]  # noqa: N802  (the name is Markdown's)
+    def handleMatch(  # noqa: N802  (the name is Markdown's)
         self, m: re.Match[str], data: str
     ) -> tuple[ElementTree.Element | str, int, int]:
         """Replace one by its MathML."""
@@ -62,7 +64,8 @@ class Equations(Extension):
 
     def extendMarkdown(self, md: Markdown) -> None:  # noqa: N802  (the name is Markdown's)
         """Register them before code of any kind."""
-        md.preprocessors.register(_Blocks(md), "equations", 40)
+        # After the cleaning of whitespace (30), which takes stored markup out, before fences (25).
+        md.preprocessors.register(_Blocks(md), "equations", 27)
         md.inlinePatterns.register(_Inline(r"\$`([^`]+)`\$", md), "equations", 200)
 
 

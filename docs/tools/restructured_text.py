@@ -68,7 +68,7 @@ def _with_tables(lines: list[str]) -> list[str]:
 
 
 def _plain(lines: list[str]) -> list[str]:
-    done = []
+    done: list[str] = []
     for line in lines:
         if set(line.strip()) == {"-"} and done and done[-1].strip() == "References":
             done[-1] = "**References**"
