@@ -6,7 +6,7 @@ Fenced blocks of the pages are taken as follows.
   together are that file; it is read as what it is (a scenario, a dataset, a sweep, a mapping).
   ``<!-- added to: FILE -->`` above a block: the file with it is read too.
 - ``python``: run, all blocks of a page one after the other, in a folder with those files and the
-  dataset of the tutorial, made smaller.
+  dataset of the tutorial, made smaller, and the table of its sweep, made up.
 - ``sh``: commands, options, modules and files must exist; nothing is run.
 - ``<!-- not run: why -->`` above a block: only its syntax is checked.
 """
@@ -33,12 +33,14 @@ import typer
 from typer.testing import CliRunner
 
 from mmslam.cli import app
+from mmslam.sweep_command import STORE
 from mmslam.sweep_mapping import load_mapping
 from scenes.library import load_scenario
 from scenes.toml_writer import toml_text
 from simulator.dataset import make_dataset, plan_dataset
 from simulator.resumable_work import Workers
-from validation.sweep import plan_sweep
+from validation.sweep import Outcome, plan_sweep
+from validation.sweep_tables import error_dataset
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 DOCS = CHECKOUT / "docs"
@@ -167,6 +169,29 @@ def small_dataset(folder: Path) -> None:
     assert make_dataset(job, workers=Workers(processes=0)).failed == 0
 
 
+def made_up_errors(folder: Path) -> None:
+    """Write the table of the tutorial's sweep as the command does, with errors made up."""
+    job = plan_sweep(folder / "snr.toml", folder / "cache")
+    unknown: dict[str, Any] = dict.fromkeys(("deviation", "wall_angle", "wall_offset"))
+    outcomes = [
+        Outcome(
+            point=point,
+            realisation=point // job.config.grid_size,
+            parameters=job.space.first(point)[0].values,
+            user="ann",
+            status="found",
+            reason=None,
+            error=1e-6 * (1 + point),
+            bound=1e-6,
+            bound_with_walls=1e-6,
+            **unknown,
+        )
+        for point in range(job.config.points)
+    ]
+    store = folder / "out" / "snr" / STORE
+    error_dataset(outcomes, job.config).to_zarr(store, zarr_format=3, consolidated=False)
+
+
 PYTHON = sorted({block.page for block in RUN if block.language == "python"})
 
 
@@ -177,6 +202,8 @@ def test_the_python_of_a_page_runs(
     code = [block for block in RUN if block.language == "python" and block.page == page]
     if any("rooms.zarr" in block.text for block in code):
         small_dataset(folder)
+    if any("errors.zarr" in block.text for block in code):
+        made_up_errors(folder)
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
     for block in code:

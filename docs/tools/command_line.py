@@ -41,7 +41,8 @@ def _options(command: Any, context: Any) -> Iterator[str]:
         found = one.get_help_record(context)
         if found is None:  # an argument, perhaps without help
             found = (one.make_metavar(context), getattr(one, "help", None) or "")
-        rows.append(tuple(" ".join(cell.split()).replace("|", "\\|") for cell in found))
+        name, told = (" ".join(cell.split()) for cell in found)
+        rows.append((name, told.replace("|", "&#124;")))  # in code, a bar divides no cells
     if rows:
         yield "| | |\n|---|---|"
         yield from (f"| `{name}` | {told} |" for name, told in rows)

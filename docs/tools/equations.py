@@ -185,6 +185,7 @@ class _Parser:
             raise self.fail(f"{token} where nothing is open")
         shown = {"-": "−", "*": "∗"}.get(token, token)
         fixed = ' stretchy="false"' if token in "()[]|" else ""
+        fixed += ' lspace="0" rspace="0"' if token in "|/" else ""
         return _Atom(f"<mo{fixed}>{escape(shown)}</mo>")
 
     def command(self, token: str) -> _Atom:
