@@ -132,3 +132,8 @@ def test_each_error_can_be_planted_and_has_claims_to_turn_red(
     assert set(chosen.claims) <= known
     plant(chosen, tmp_path)  # raises if the line is not there exactly once
     assert chosen.wrong in (tmp_path / chosen.file).read_text(encoding="utf-8")
+
+
+def test_the_page_of_results_is_the_one_that_its_figures_make() -> None:
+    folder = Path(__file__).parents[2] / "docs" / "results"
+    assert (folder / "index.md").read_text(encoding="utf-8") == recorded_page(folder)
