@@ -180,8 +180,14 @@ class GrowingDataset:
         _save(self._sample_file(sample), row)
 
     def collect(self, block: int) -> None:
-        """Move all samples of a block from their files into the store."""
+        """Move all samples of a block from their files into the store.
+
+        Done again, after a worker was killed over it, it goes on where that one was.
+        """
         samples = self.layout.block_samples(block)
+        if self._block_file(block).exists():  # written last: the store holds the block
+            self._unstage(samples)
+            return
         rows = [self._staged_row(sample) for sample in samples]
         group = zarr.open_group(self.store, mode="r+")
         for variable in self.layout.variables:
@@ -193,8 +199,7 @@ class GrowingDataset:
                 )
                 _flush(self.store / variable.key / "c" / str(block))
         self._write_block(block, {key: np.stack([row[key] for row in rows]) for key in rows[0]})
-        for sample in samples:
-            self._sample_file(sample).unlink(missing_ok=True)
+        self._unstage(samples)
 
     def finish(self) -> None:
         """Write the labels into the store, and put it where it belongs."""
@@ -222,6 +227,10 @@ class GrowingDataset:
 
     def _block_file(self, block: int) -> Path:
         return self.folder / "blocks" / f"{block}.npz"
+
+    def _unstage(self, samples: range) -> None:
+        for sample in samples:
+            self._sample_file(sample).unlink(missing_ok=True)
 
     def _staged_row(self, sample: int) -> Row:
         return _load(self._sample_file(sample))

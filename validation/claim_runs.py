@@ -87,28 +87,26 @@ def run_claims(
             yield kept
             continue
         started = time.perf_counter()
-        picture: str | None = None
+        rows: tuple[Row, ...] = ()
+        remarks: tuple[str, ...] = ()
+        picture = problem = None
         try:
             finding = claim.measure(effort, told(claim))
+            rows, remarks = tuple(finding.rows), tuple(finding.remarks)
             picture = _drawn(claim, finding, folder)
         except Exception as error:
-            yield ClaimRun(
-                claim=claim,
-                rows=(),
-                remarks=(),
-                seconds=time.perf_counter() - started,
-                picture=None,
-                problem=f"{type(error).__name__}: {error}",
-            )
-            continue
+            # With its figures, if it is the drawing that failed.
+            problem = f"{type(error).__name__}: {error}"
         run = ClaimRun(
             claim=claim,
-            rows=tuple(finding.rows),
-            remarks=tuple(finding.remarks),
+            rows=rows,
+            remarks=remarks,
             seconds=time.perf_counter() - started,
             picture=picture,
+            problem=problem,
         )
-        write_aside(folder / f"{claim.key}.json", _text(run, digest, effort))
+        if problem is None:
+            write_aside(folder / f"{claim.key}.json", _text(run, digest, effort))
         yield run
 
 

@@ -176,6 +176,27 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(quiet: DatasetJob, tmp_pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["config.toml", "it.zarr"]
 
 
+@pytest.mark.parametrize("left", [0, 2, 4])
+def test_a_block_may_be_collected_again_by_another_worker(
+    quiet: DatasetJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: int
+) -> None:
+    """One that was killed may have kept the block, and removed some of its samples."""
+    job = planned(tmp_path)
+    once = dataset_store.GrowingDataset.collect
+
+    def twice(growing: dataset_store.GrowingDataset, block: int) -> None:
+        samples = list(growing.layout.block_samples(block))[:left]
+        rows = [growing._staged_row(sample) for sample in samples]
+        once(growing, block)
+        for sample, row in zip(samples, rows, strict=True):
+            growing.put(sample, row)
+        once(growing, block)
+
+    monkeypatch.setattr(dataset_store.GrowingDataset, "collect", twice)
+    make_dataset(job, workers=HERE)
+    assert same_bytes(job.target, quiet.target)
+
+
 def test_a_finished_dataset_is_left_as_it_is(quiet: DatasetJob) -> None:
     before = quiet.target.stat().st_mtime_ns
     assert make_dataset(quiet, workers=HERE).made_now == 0

@@ -89,6 +89,16 @@ def test_a_claim_that_raises_has_failed_and_the_next_one_goes_on(tmp_path: Path)
     assert not (tmp_path / "broken.json").exists()  # so that it is tried again
 
 
+def test_a_figure_that_cannot_be_drawn_fails_and_hides_no_numbers(tmp_path: Path) -> None:
+    def draw(figure: object) -> None:
+        raise RuntimeError("no ink")
+
+    (run,) = runs(tmp_path, claim(lambda: Finding(rows=[row(0.5)], draw=draw)))
+    assert not run.passed
+    assert run.problem == "RuntimeError: no ink"
+    assert [one.measured for one in run.rows] == [0.5]
+
+
 def test_the_page_of_results_says_what_was_measured(tmp_path: Path) -> None:
     found = runs(
         tmp_path / "run",
