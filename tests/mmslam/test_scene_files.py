@@ -26,7 +26,8 @@ def test_an_export_holds_what_mmslam_sionna_and_blender_open(tmp_path: Path) -> 
     assert {"mine/slam_2d.toml", "mine/slam_2d.xml", "mine/slam_2d_meshes/wall.ply"} < files
     code, shown, _ = mmslam("scenes", "mine/slam_2d_facets.toml", "--json")
     assert code == 0
-    assert json.loads(shown)["objects"]["wall"]["facets"] == "file"
+    realisation = json.loads(shown)["objects"]["wall"]["realisation"]
+    assert realisation == str(tmp_path / "mine" / "slam_2d_facets_meshes" / "wall.ply")
 
 
 def test_another_seeds_wall_does_not_overwrite_the_first() -> None:
