@@ -485,6 +485,7 @@ def validate(
                 typer.echo(f"{claim.key:<20} {form:<10} {claim.minutes:4g} min  {claim.title}")
             return
         folder = out or Path("out") / ("validate-quick" if quick else "validate")
+        commands.refuse_impossible(keys, quick=quick, record=record, against=against)
         with commands.console_on_stdout() as console, stdout_kept_clean():
             found = commands.check_claims(
                 keys,
@@ -495,7 +496,7 @@ def validate(
             )
         gone = [] if against is None else commands.drift(found, against)
         if record is not None:
-            commands.record(found, record, folder)
+            commands.record_run(found, record, folder)
         if as_json:
             _print_json({**found, "drifted": gone})
         else:

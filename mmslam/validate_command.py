@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from mmslam.interruption import ResumableInterruption
 from mmslam.output import OutputError
 from mmslam.progress import StageProgress
 from validation.claim import Claim, Effort, Tell
@@ -66,6 +67,8 @@ def check_claims(
     ------
     OutputError
         If there is no such claim, or the folder holds something else.
+    ResumableInterruption
+        On Ctrl-C; says how to go on.
     """
     claims, effort = chosen_claims(only, quick=quick), _effort(quick)
     _refuse_foreign(folder)
@@ -77,9 +80,15 @@ def check_claims(
         def told(claim: Claim) -> Tell:
             return lambda done, count: progress(claim.key, done, count)
 
-        for run in run_claims(claims, effort=effort, folder=folder, fresh=fresh, told=told):
-            runs.append(run)
-            shown(claim_table(run))
+        try:
+            for run in run_claims(claims, effort=effort, folder=folder, fresh=fresh, told=told):
+                runs.append(run)
+                shown(claim_table(run))
+        except KeyboardInterrupt:
+            raise ResumableInterruption(
+                f"interrupted; {len(runs)} of {len(claims)} claims are kept in {folder}: the same "
+                "command goes on"
+            ) from None
     document = {
         "effort": effort,
         "code": code_digest(),
@@ -90,38 +99,47 @@ def check_claims(
     return document
 
 
-def record(document: Mapping[str, Any], folder: Path, run_folder: Path) -> None:
+def refuse_impossible(
+    only: Sequence[str], *, quick: bool, record: Path | None, against: Path | None
+) -> None:
+    """Refuse, before anything is measured, what could not be kept or compared.
+
+    Raises
+    ------
+    OutputError
+        If claims are chosen and all are to be kept, or nothing is stated in this form.
+    """
+    effort = _effort(quick)
+    if record is not None and only:
+        raise OutputError(
+            f"--record {record}: keeps all claims, and --only {only[0]} leaves others out; leave "
+            "--only out"
+        )
+    if against is not None and read_record(against, effort) is None:
+        raise OutputError(
+            f"--against {against}: no {effort}.json there; make it with --record {against}"
+        )
+
+
+def record_run(document: Mapping[str, Any], folder: Path, run_folder: Path) -> None:
     """Keep a run of all claims in the documentation.
 
     Raises
     ------
     OutputError
-        If it is a run of some claims only, or a claim could not be measured.
+        If a claim could not be measured.
     """
-    effort = document["effort"]
-    missing = {claim.key for claim in chosen_claims((), quick=effort == "quick")}
-    missing -= {claim["key"] for claim in document["claims"] if claim["problem"] is None}
+    missing = [claim["key"] for claim in document["claims"] if claim["problem"] is not None]
     if missing:
         raise OutputError(
-            f"--record {folder}: the run lacks {', '.join(sorted(missing))}; leave --only out"
+            f"--record {folder}: {', '.join(missing)} could not be measured; nothing was kept"
         )
     record_results(document, folder, run_folder)
 
 
 def drift(document: Mapping[str, Any], folder: Path) -> list[str]:
-    """Compare a run with what the documentation states; a line for each figure that is off.
-
-    Raises
-    ------
-    OutputError
-        If nothing is stated there in this form.
-    """
-    stated = read_record(folder, document["effort"])
-    if stated is None:
-        raise OutputError(
-            f"--against {folder}: no {document['effort']}.json there; make it with --record"
-        )
-    return drifted(document, stated)
+    """Compare a run with what the documentation states; a line for each figure that is off."""
+    return drifted(document, read_record(folder, document["effort"]) or {"claims": []})
 
 
 def claim_table(run: ClaimRun) -> Table:
