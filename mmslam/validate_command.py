@@ -14,7 +14,7 @@ from mmslam.interruption import ResumableInterruption
 from mmslam.output import OutputError
 from mmslam.progress import StageProgress
 from validation.claim import Claim, Effort, Tell
-from validation.claim_runs import ClaimRun, code_digest, run_claims, run_document, write_aside
+from validation.claim_runs import ClaimRun, claims_digest, run_claims, run_document, write_aside
 from validation.claims import ALL_CLAIMS
 from validation.results_page import drifted, read_record, record_results, to_text
 
@@ -91,7 +91,7 @@ def check_claims(
             ) from None
     document = {
         "effort": effort,
-        "code": code_digest(),
+        "code": claims_digest(),
         "passed": all(run.passed for run in runs),
         "claims": [run_document(run) for run in runs],
     }

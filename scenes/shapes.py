@@ -83,9 +83,8 @@ def object_surface(
         spacing = scenario.facet_spacing(name)
     if not spacing > 0:
         raise ValueError(f"spacing = {spacing} m must be positive; give a length")
+    body = body.frozen or body  # its heights are in the mesh, and it is smooth by itself
     heights = Heights(body.roughness, random_stream(seed, sample, f"roughness/{name}"))
-    if body.frozen is not None:
-        body, heights = body.frozen, Heights(None, random_stream(seed, sample, "none"))
     if isinstance(body, MeshFile):
         if scenario.dimensions == 2:
             from scenes.mesh_lines import lines_are_closed, mesh_lines

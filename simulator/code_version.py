@@ -36,28 +36,34 @@ def package_versions() -> dict[str, str]:
 
 
 @functools.cache
-def code_digest(packages: tuple[str, ...] = ("scenes", "simulator")) -> str:
+def code_digest(
+    packages: tuple[str, ...] = ("scenes", "simulator"), endings: tuple[str, ...] = (".py",)
+) -> str:
     """Return a digest of all Python code of some of our packages: between releases it changes too.
 
     Parameters
     ----------
     packages
         Their names.
+    endings
+        Of the files that count: code alone, or data that lie beside it as well.
     """
     digest = hashlib.sha256()
     for package in packages:
-        for name, content in sorted(_modules(files(package), package)):
+        for name, content in sorted(_contents(files(package), package, endings)):
             digest.update(f"{name}\0{len(content)}\0".encode())
             digest.update(content)
     return digest.hexdigest()[:16]
 
 
-def _modules(folder: Traversable, path: str) -> Sequence[tuple[str, bytes]]:
+def _contents(
+    folder: Traversable, path: str, endings: tuple[str, ...]
+) -> Sequence[tuple[str, bytes]]:
     found: list[tuple[str, bytes]] = []
     for entry in folder.iterdir():
         if entry.is_dir():
-            found += _modules(entry, f"{path}/{entry.name}")
-        elif entry.name.endswith(".py"):
+            found += _contents(entry, f"{path}/{entry.name}", endings)
+        elif entry.name.endswith(endings):
             # Line ends differ between checkouts of one version.
             found.append((f"{path}/{entry.name}", entry.read_bytes().replace(b"\r\n", b"\n")))
     return found

@@ -28,6 +28,7 @@ from simulator.dataset_store import (
     GrowingDataset,
     codec,
     failed_samples,
+    stored_array,
 )
 from simulator.resumable_work import (
     Result,
@@ -323,10 +324,10 @@ def _failures(path: Path, layout: Layout) -> Iterator[Failure]:
     for told, sample in enumerate(failed_samples(path)):
         if told == MOST_FAILURES_TOLD:
             return
-        values = {one.name: _value(group[one.key][sample]) for one in names}  # type: ignore[index]
+        values = {one.name: _value(stored_array(group, one.key)[sample]) for one in names}
         yield Failure(
             sample=sample,
-            reason=str(_value(group["failure"][sample])),  # type: ignore[index]
+            reason=str(_value(stored_array(group, "failure")[sample])),
             parameters={key: value for key, value in values.items() if value is not None},
         )
 

@@ -192,8 +192,7 @@ class GrowingDataset:
         group = zarr.open_group(self.store, mode="r+")
         for variable in self.layout.variables:
             if variable.large:
-                array = group[variable.key]
-                assert isinstance(array, zarr.Array)
+                array = stored_array(group, variable.key)
                 array[samples.start : samples.stop] = np.stack(
                     [row.pop(variable.key) for row in rows]
                 )
@@ -212,8 +211,7 @@ class GrowingDataset:
             start = blocks.start * self.layout.block
             for variable in small:
                 values = np.concatenate([part[variable.key] for part in parts])
-                array = group[variable.key]
-                assert isinstance(array, zarr.Array)
+                array = stored_array(group, variable.key)
                 array[start : start + len(values)] = _as_stored(variable, values)
         for variable in small:
             _flush(self.store / variable.key)
@@ -303,12 +301,18 @@ def create_store(path: Path, layout: Layout) -> None:
 
 def failed_samples(path: Path) -> Iterator[int]:
     """Yield the samples of a finished dataset that could not be made."""
-    array = zarr.open_group(path, mode="r")["status"]
-    assert isinstance(array, zarr.Array)
+    array = stored_array(zarr.open_group(path, mode="r"), "status")
     for start in range(0, array.shape[0], LABEL_SAMPLES):
         status = np.asarray(array[start : start + LABEL_SAMPLES])
         for at in np.flatnonzero(status == FAILED):
             yield start + int(at)
+
+
+def stored_array(group: zarr.Group, key: str) -> zarr.Array[Any]:
+    """Open an array of a dataset."""
+    found = group[key]
+    assert isinstance(found, zarr.Array)  # the store is one that create_store made
+    return found
 
 
 def codec(variable: Variable) -> BloscCodec:
@@ -357,8 +361,7 @@ def _read_labels(store: Path, layout: Layout, samples: range) -> Row:
     found = {}
     for variable in layout.variables:
         if not variable.large:
-            array = group[variable.key]
-            assert isinstance(array, zarr.Array)
+            array = stored_array(group, variable.key)
             found[variable.key] = np.asarray(array[samples.start : samples.stop])
     return found
 
@@ -368,8 +371,7 @@ def _read_large(store: Path, layout: Layout, sample: int) -> Row:
     found = {}
     for variable in layout.variables:
         if variable.large:
-            array = group[variable.key]
-            assert isinstance(array, zarr.Array)
+            array = stored_array(group, variable.key)
             found[variable.key] = np.asarray(array[sample])
     return found
 

@@ -1,14 +1,20 @@
 """Bodies whose scattering has a closed form or a series: plate, sphere, cylinder, rough plate."""
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 from scipy.special import hankel2, jv, spherical_jn, spherical_yn
 
+from scenes.rough_surface import rough_sheet
+from scenes.scenario import parse_scenario
 from scenes.shapes import Surface
 from scenes.upright_shapes import grid_triangles
 from simulator.facets import Facets, surface_facets
 from simulator.physical_optics import Ports, isotropic, scattered
+from simulator.radio_scene import RadioScene, radio_scene
+from simulator.simulation import simulate
 
 
 def plate_cross_section(
@@ -115,3 +121,119 @@ def facets_cross_section(
     field = scattered(facets, port, port, frequencies, waves="spherical")
     wavelengths = speed_of_light / frequencies
     return np.asarray((4 * np.pi) ** 3 * distance**4 * np.abs(field / wavelengths) ** 2)
+
+
+def cylinder_echo_over_series() -> Complex[np.ndarray, "positions freqs"]:
+    """Simulate the echo of a conducting cylinder of 5 mm radius, over its series. [-].
+
+    Between 220 and 295 GHz ka is 23 to 31.
+    """
+    radius = 0.005
+    scenario = parse_scenario(
+        {
+            "name": "post",
+            "waves": "cylindrical",
+            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 151},
+            "base_station": {"elements": 3, "spacing_mm": 20.0},
+            "objects": {
+                "post": {
+                    "kind": "cylinder",
+                    "material": "metal",
+                    "centre_m": [0.05, 0.3],
+                    "radius_m": radius,
+                }
+            },
+        }
+    )
+    echo = simulate(scenario, seed=0).measurement.echo
+    if echo is None:
+        raise ValueError("no echo was simulated; give the scenario an object")
+    wavenumbers = 2 * np.pi * echo.frequencies / speed_of_light
+    distances = np.linalg.norm(echo.positions - np.array([0.05, 0.3, 0.0]), axis=-1)
+    expected = np.stack([cylinder_series(radius, float(d), wavenumbers) for d in distances])
+    return np.asarray(echo.samples / expected)
+
+
+def half_shadowed_plate() -> RadioScene:
+    """Draw a rough plate of drywall, half in a post's shadow, in space."""
+    scenario = parse_scenario(
+        {
+            "name": "plate",
+            "dimensions": 3,
+            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 21},
+            "base_station": {"elements": 1, "spacing_mm": 0.5},
+            "objects": {
+                "plate": {
+                    "kind": "plate",
+                    "material": "drywall",
+                    "centre_m": [0.0, 0.3],
+                    "length_m": 0.01,
+                    "height_m": 0.01,
+                    "roughness": {"rms_mm": 0.1, "correlation_mm": 0.4},
+                },
+                "post": {
+                    "kind": "cylinder",
+                    "material": "metal",
+                    "centre_m": [0.002, 0.29],
+                    "radius_m": 0.002,
+                    "height_m": 0.005,
+                },
+            },
+        }
+    )
+    return radio_scene(scenario, seed=1, sample=0)
+
+
+def mean_specular_field(
+    levels: Float[np.ndarray, " levels"],
+    *,
+    side: float,
+    length: float,
+    draws: int,
+    advance: Callable[[int, int], None] = lambda done, steps: None,
+) -> Float[np.ndarray, " levels"]:
+    """Average the specular field of rough conducting plates at 275 GHz and 40°.
+
+    There are eight facets for each correlation length: the planes between vertices have 1 % less
+    variance than the surface, with four 4 %, which alone is 13 % of the field at level 1.2.
+
+    Parameters
+    ----------
+    levels
+        k·rms·cosθ; the first one is 0, the smooth plate's. [-]
+    side, length
+        Of the square plates, and the correlation length. [m]
+    draws
+        How many plates.
+    advance
+        Told the plates done and their number.
+
+    Returns
+    -------
+    Magnitude of the mean over that of the smooth plate. [-]
+    """
+    step = length / 8
+    frequencies = np.array([274.9e9, 275.1e9])
+    wavenumber = 2 * np.pi * 275e9 / speed_of_light
+    angle = np.radians(40.0)
+    one = 30.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])
+    rng = np.random.default_rng(11)
+    count = round(side / step) + 1
+    mean = np.zeros(levels.size, dtype=np.complex128)
+    for draw in range(draws):
+        heights = rough_sheet(
+            lengths=(side, side),
+            counts=(count, count),
+            rms=1.0,
+            correlation_length=length,
+            spectrum="gaussian",
+            inner_cutoff=0.0,
+            rng=rng,
+        )
+        for index, level in enumerate(levels.tolist()):
+            rms = level / (wavenumber * np.cos(angle))
+            facets = plate_facets(side, side, step=step, heights=rms * heights)
+            there, here = (ports(end[None], facets) for end in (one, one * [-1, 1, 1]))
+            mean[index] += scattered(facets, there, here, frequencies, waves="spherical")[0, 0]
+        advance(draw + 1, draws)
+    return np.asarray(np.abs(mean / mean[0]))

@@ -6,17 +6,15 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from simulator.code_version import code_digest, package_versions
 from validation.claim import Claim, Effort, Finding, Row, Tell
 
 OUR_PACKAGES = ("scenes", "simulator", "estimator", "validation")
-THEIR_PACKAGES = ("drjit", "finufft", "mitsuba", "numpy", "scipy", "sionna-rt")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,18 +35,10 @@ class ClaimRun:
         return self.problem is None and all(row.passed for row in self.rows)
 
 
-def code_digest() -> str:
+def claims_digest() -> str:
     """Return what the figures depend on: our sources and scenes, and the versions of libraries."""
-    digest = hashlib.sha256()
-    for package in OUR_PACKAGES:
-        root = Path(str(files(package)))
-        for path in sorted(root.rglob("*")):
-            if path.is_file() and path.suffix in {".py", ".toml", ".ply", ".npz"}:
-                digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
-                digest.update(path.read_bytes())
-    for package in THEIR_PACKAGES:
-        digest.update(f"{package} {version(package)}\n".encode())
-    return digest.hexdigest()[:16]
+    ours = code_digest(OUR_PACKAGES, (".py", ".toml", ".ply", ".npz"))
+    return hashlib.sha256(f"{ours} {package_versions()}".encode()).hexdigest()[:16]
 
 
 def run_claims(
@@ -80,7 +70,7 @@ def run_claims(
     Each claim's figures as they are known. A claim that raises has failed; the others go on.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    digest = code_digest()
+    digest = claims_digest()
     for claim in claims:
         kept = None if fresh else _kept(claim, folder, digest, effort)
         if kept is not None:

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -19,6 +21,7 @@ from validation import figures, views
 from validation.claim import Row
 from validation.metrics import WallError, wall_error
 from validation.resolution_bars import draw_resolution_bars
+from validation.row_table import conclude_with_figure
 from validation.scenario_plan import outline
 from validation.target_association import compare_targets
 from validation.truth import Truth, front_face, truth_from_dataset
@@ -36,6 +39,13 @@ OFFSET_LIMIT = 0.5e-3
 :data:`RANGE_LIMIT`. [m]"""
 PEAK_WITHIN = 8e-3
 """Where the corrected image's peak is looked for around a true front face: two cells. [m]"""
+
+
+class MeasureSeed(Protocol):
+    """Simulates and images one realisation."""
+
+    def __call__(self, *, seed: int) -> "HiddenImaging":
+        """Do so for a seed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +163,26 @@ def compare_hidden(
         pixel=max(estimate.corrected_image.grid.spacing),
         estimate=estimate,
         echo=echo,
+    )
+
+
+def conclude_hidden(arguments: Sequence[str], name: str, measure: MeasureSeed) -> None:
+    """Run an experiment from the command line: simulate, draw the first, print and check.
+
+    Parameters
+    ----------
+    arguments
+        The figure's file and the number of realisations, both optional.
+    name
+        Of the experiment; the file's default.
+    measure
+        Simulates and images a realisation by its seed.
+    """
+    path = Path(arguments[0] if arguments else f"{name}.png")
+    seeds = int(arguments[1]) if len(arguments) > 1 else 1
+    results = [measure(seed=seed) for seed in range(seeds)]
+    conclude_with_figure(
+        path, (12.5, 6.4), lambda figure: draw_hidden(figure, results[0]), hidden_rows(results)
     )
 
 

@@ -70,7 +70,7 @@ def nearest_wall(mirror: Mirror, truth: Truth) -> str | None:
         return None
     points = np.stack([mirror.start, (mirror.start + mirror.end) / 2, mirror.end])
     distances = [
-        float(np.mean(_from_segment(points, truth.wall_start[name], truth.wall_end[name])))
+        float(np.mean(distances_from_segment(points, truth.wall_start[name], truth.wall_end[name])))
         for name in names
     ]
     return names[int(np.argmin(distances))]
@@ -87,11 +87,12 @@ def wall_errors(mirrors: Sequence[Mirror], truth: Truth) -> tuple[WallError | No
     )
 
 
-def _from_segment(
+def distances_from_segment(
     points: Float[np.ndarray, "points 3"],
     start: Float[np.ndarray, " 3"],
     end: Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, " points"]:
+    """Return the distances of points from the nearest point of a segment [m]."""
     along = end - start
     share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
     distances: np.ndarray = np.linalg.norm(points - (start + share[:, None] * along), axis=-1)

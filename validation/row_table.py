@@ -1,6 +1,10 @@
 """Prints what an experiment measured beside its limits, and refuses what falls outside."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 from validation.claim import Row
 
@@ -30,3 +34,26 @@ def conclude(rows: Sequence[Row]) -> None:
                 f"{row.name} ({row.measured:.4g} {row.unit}, {row.limits})" for row in failed
             )
         )
+
+
+def conclude_with_figure(
+    path: Path, size: tuple[float, float], draw: Callable[[Figure], None], rows: Sequence[Row]
+) -> None:
+    """Write an experiment's figure, then print and check its numbers.
+
+    Parameters
+    ----------
+    path
+        PNG file.
+    size
+        Width and height of the figure. [inch]
+    draw
+        Draws into it.
+    rows
+        See :func:`conclude`.
+    """
+    figure = plt.figure(figsize=size, layout="constrained")
+    draw(figure)
+    figure.savefig(path, dpi=150)
+    print(f"written: {path}")
+    conclude(rows)

@@ -5,17 +5,15 @@ import pytest
 import trimesh
 from scipy.constants import speed_of_light
 
-from scenes.rough_surface import rough_sheet
-from scenes.scenario import parse_scenario
 from scenes.shapes import Surface
 from simulator.facets import surface_facets
 from simulator.physical_optics import scattered
-from simulator.radio_scene import radio_scene
 from simulator.ray_scene import facets_visible
-from simulator.simulation import simulate
 from validation.canonical_scatterers import (
-    cylinder_series,
+    cylinder_echo_over_series,
     facets_cross_section,
+    half_shadowed_plate,
+    mean_specular_field,
     plate_cross_section,
     plate_facets,
     ports,
@@ -77,85 +75,26 @@ def test_a_spheres_echo_is_that_of_its_series() -> None:
 
 
 def test_a_cylinders_echo_is_that_of_its_series() -> None:
-    scene = parse_scenario(
-        {
-            "name": "post",
-            "waves": "cylindrical",
-            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 151},
-            "base_station": {"elements": 3, "spacing_mm": 20.0},
-            "objects": {
-                "post": {
-                    "kind": "cylinder", "material": "metal", "centre_m": [0.05, 0.3],
-                    "radius_m": 0.005,
-                }
-            },
-        }
-    )  # fmt: skip
-    found = simulate(scene, seed=0).measurement.echo
-    assert found is not None
-    wavenumbers = 2 * np.pi * found.frequencies / speed_of_light
-    assert wavenumbers.min() * 0.005 >= 20
-    for position, samples in zip(found.positions, found.samples, strict=True):
-        distance = float(np.linalg.norm(position - [0.05, 0.3, 0.0]))
-        expected = cylinder_series(0.005, distance, wavenumbers)
-        error_db = 20 * np.log10(np.abs(samples / expected))
-        assert np.abs(error_db).max() <= 0.5
-        # Its phase too: the shadow's edge and the next order in 1/ka = 0.04.
-        assert np.abs(np.angle(samples / expected)).max() <= 0.06
+    assert 2 * np.pi * 220e9 / speed_of_light * 0.005 >= 20
+    ratio = cylinder_echo_over_series()
+    error_db = 20 * np.log10(np.abs(ratio))
+    assert np.abs(error_db).max() <= 0.5
+    # Its phase too: the shadow's edge and the next order in 1/ka = 0.04.
+    assert np.abs(np.angle(ratio)).max() <= 0.06
 
 
 @pytest.mark.slow
 def test_a_rough_plates_mean_echo_falls_by_the_coherent_loss() -> None:
-    # 20 plates of 50² patches (a correlation length each way): 5e4 independent patches. Eight
-    # facets for each length: the planes between vertices have 1 % less variance than the
-    # surface, with four 4 %, which alone is 13 % of the field at 1.2.
-    side, length, draws = 50e-3, 1e-3, 20
-    step = length / 8
-    frequencies = np.array([274.9e9, 275.1e9])
-    wavenumber = 2 * np.pi * 275e9 / speed_of_light
-    angle = np.radians(40.0)
-    one = 30.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])
+    # 20 plates of 50² patches (a correlation length each way): 5e4 independent patches.
     levels = np.array([0.0, 0.3, 0.6, 0.9, 1.2])  # k·rms·cosθ
-    rng = np.random.default_rng(11)
-    count = round(side / step) + 1
-    mean = np.zeros(levels.size, dtype=np.complex128)
-    for _ in range(draws):
-        heights = rough_sheet(
-            lengths=(side, side), counts=(count, count), rms=1.0, correlation_length=length,
-            spectrum="gaussian", inner_cutoff=0.0, rng=rng,
-        )  # fmt: skip
-        for index, level in enumerate(levels):
-            rms = level / (wavenumber * np.cos(angle))
-            facets = plate_facets(side, side, step=step, heights=rms * heights)
-            there, here = (ports(end[None], facets) for end in (one, one * [-1, 1, 1]))
-            mean[index] += scattered(facets, there, here, frequencies, waves="spherical")[0, 0]
-    ratio = mean / mean[0]
+    ratio = mean_specular_field(levels, side=50e-3, length=1e-3, draws=20)
     expected = np.exp(-2 * levels**2)
     # Half the square of a length decorrelates at 1.2: 5e4 of those leave 4 % of the field there.
-    np.testing.assert_allclose(np.abs(ratio), expected, rtol=0.1)
+    np.testing.assert_allclose(ratio, expected, rtol=0.1)
 
 
 def test_a_rough_plate_with_traced_shadows_is_reciprocal() -> None:
-    scene = parse_scenario(
-        {
-            "name": "plate",
-            "dimensions": 3,
-            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 21},
-            "base_station": {"elements": 1, "spacing_mm": 0.5},
-            "objects": {
-                "plate": {
-                    "kind": "plate", "material": "drywall", "centre_m": [0.0, 0.3],
-                    "length_m": 0.01, "height_m": 0.01,
-                    "roughness": {"rms_mm": 0.1, "correlation_mm": 0.4},
-                },
-                "post": {
-                    "kind": "cylinder", "material": "metal", "centre_m": [0.002, 0.29],
-                    "radius_m": 0.002, "height_m": 0.005,
-                },
-            },
-        }
-    )  # fmt: skip
-    made = radio_scene(scene, seed=1, sample=0)
+    made = half_shadowed_plate()
     facets = made.facets
     assert facets is not None
     ends = np.array([[-0.15, 0.02, 0.05], [0.1, -0.03, -0.04]])
@@ -163,6 +102,6 @@ def test_a_rough_plate_with_traced_shadows_is_reciprocal() -> None:
         ports(end[None], facets, facets_visible(made.rays, facets, end[None])) for end in ends
     )
     assert 0.2 < one.visible.mean() < 0.95
-    there = scattered(facets, one, other, scene.radio.frequencies, waves="spherical")
-    back = scattered(facets, other, one, scene.radio.frequencies, waves="spherical")
+    there = scattered(facets, one, other, made.scenario.radio.frequencies, waves="spherical")
+    back = scattered(facets, other, one, made.scenario.radio.frequencies, waves="spherical")
     assert np.linalg.norm(there - back) <= 1e-6 * np.linalg.norm(there)

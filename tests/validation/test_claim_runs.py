@@ -66,7 +66,7 @@ def test_what_is_measured_is_kept_until_the_code_changes(
     assert run_document(first) == run_document(second)
     runs(tmp_path, claim(measure), fresh=True)
     assert len(calls) == 2
-    monkeypatch.setattr(claim_runs, "code_digest", lambda: "other code")
+    monkeypatch.setattr(claim_runs, "claims_digest", lambda: "other code")
     runs(tmp_path, claim(measure))
     assert len(calls) == 3
 

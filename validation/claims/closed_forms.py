@@ -4,16 +4,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from scenes.rough_surface import rough_sheet
-from scenes.scenario import parse_scenario
-from simulator.physical_optics import scattered
-from simulator.simulation import simulate
 from validation.canonical_scatterers import (
-    cylinder_series,
+    cylinder_echo_over_series,
     facets_cross_section,
+    mean_specular_field,
     plate_cross_section,
     plate_facets,
-    ports,
 )
 from validation.claim import Claim, Effort, Finding, Row, Tell
 
@@ -35,7 +31,7 @@ def bodies(effort: Effort, tell: Tell) -> Finding:
     above = expected > expected.max(axis=0) * 10**-2.5
     errors = 10 * np.log10(measured[above] / expected[above])
     peak = 10 * np.log10(measured[60] / (4 * np.pi * (width * height / wavelengths) ** 2))
-    cylinder, phase = _cylinder_errors()
+    ratio = cylinder_echo_over_series()
     tell(2, 2)
     rows = [
         Row(
@@ -57,7 +53,7 @@ def bodies(effort: Effort, tell: Tell) -> Finding:
         Row(
             name="cylinder: echo level against its series, ka ≥ 20",
             stated="Bessel series, TM",
-            measured=cylinder,
+            measured=float(np.abs(20 * np.log10(np.abs(ratio))).max()),
             unit="dB",
             high=0.5,
             origin="physical optics ends at the shadow's edge: 1/(2ka) of the field",
@@ -65,7 +61,7 @@ def bodies(effort: Effort, tell: Tell) -> Finding:
         Row(
             name="cylinder: echo phase against its series",
             stated="Bessel series, TM",
-            measured=phase,
+            measured=float(np.abs(np.angle(ratio)).max()),
             unit="rad",
             high=0.06,
             origin="the same, and the next order in 1/(ka) = 0.04",
@@ -88,67 +84,13 @@ def bodies(effort: Effort, tell: Tell) -> Finding:
     return Finding(rows=rows, draw=draw)
 
 
-def _cylinder_errors() -> tuple[float, float]:
-    radius = 0.005
-    scenario = parse_scenario(
-        {
-            "name": "post",
-            "waves": "cylindrical",
-            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 151},
-            "base_station": {"elements": 3, "spacing_mm": 20.0},
-            "objects": {
-                "post": {
-                    "kind": "cylinder",
-                    "material": "metal",
-                    "centre_m": [0.05, 0.3],
-                    "radius_m": radius,
-                }
-            },
-        }
-    )
-    echo = simulate(scenario, seed=0).measurement.echo
-    if echo is None:
-        raise ValueError("no echo was simulated; give the scenario an object")
-    wavenumbers = 2 * np.pi * echo.frequencies / speed_of_light
-    distances = np.linalg.norm(echo.positions - np.array([0.05, 0.3, 0.0]), axis=-1)
-    expected = np.stack([cylinder_series(radius, float(d), wavenumbers) for d in distances])
-    ratio = echo.samples / expected
-    return (
-        float(np.abs(20 * np.log10(np.abs(ratio))).max()),
-        float(np.abs(np.angle(ratio)).max()),
-    )
-
-
 def coherent_loss(effort: Effort, tell: Tell) -> Finding:
     """Average the specular field of rough plates over realisations."""
     side, length = 50e-3, 1e-3
     draws = 20 if effort == "full" else 3
-    step = length / 8
-    frequencies = np.array([274.9e9, 275.1e9])
-    wavenumber = 2 * np.pi * 275e9 / speed_of_light
-    angle = np.radians(40.0)
-    one = 30.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])
     levels = np.array(COHERENT_LEVELS)
-    rng = np.random.default_rng(11)
-    count = round(side / step) + 1
-    mean = np.zeros(levels.size, dtype=np.complex128)
-    for draw_number in range(draws):
-        heights = rough_sheet(
-            lengths=(side, side),
-            counts=(count, count),
-            rms=1.0,
-            correlation_length=length,
-            spectrum="gaussian",
-            inner_cutoff=0.0,
-            rng=rng,
-        )
-        for index, level in enumerate(levels.tolist()):
-            rms = level / (wavenumber * np.cos(angle))
-            facets = plate_facets(side, side, step=step, heights=rms * heights)
-            there, here = (ports(end[None], facets) for end in (one, one * [-1, 1, 1]))
-            mean[index] += scattered(facets, there, here, frequencies, waves="spherical")[0, 0]
-        tell(draw_number + 1, draws)
-    measured, expected = np.abs(mean / mean[0]), np.exp(-2 * levels**2)
+    measured = mean_specular_field(levels, side=side, length=length, draws=draws, advance=tell)
+    expected = np.exp(-2 * levels**2)
     patches = draws * (side / length) ** 2
     # At k·rms·cosθ near 1 half the square of a correlation length decorrelates.
     scatter = 1 / np.sqrt(2 * patches) / expected

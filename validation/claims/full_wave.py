@@ -10,7 +10,7 @@ from validation.full_wave_reference import (
     MOST_LEVEL_DB,
     compare_with_full_wave,
 )
-from validation.metrics import error_summary
+from validation.metrics import ErrorSummary, error_summary
 from validation.reference import ROUGH_WALL, TWO_CYLINDERS
 
 STORED = "2-D method of moments, TM, 0.15 mm rms, 1 mm correlation; checked to 4e-6"
@@ -107,10 +107,12 @@ def trust(effort: Effort, tell: Tell) -> Finding:
     rows = []
     for one in found:
         statistics = (one.rms_mm, one.correlation_mm)
+        wall = f"{one.rms_mm:g} mm rms, {one.correlation_mm:g} mm long"
+        rows += _limiting_rows(one, wall)
         if statistics not in full_wave_roughness.CLAIMS:
             continue
         correlation, level = full_wave_roughness.CLAIMS[statistics]
-        what = f"{one.rms_mm:g} mm rms, {one.correlation_mm:g} mm long: image"
+        what = f"{wall}: image"
         rows += [
             Row(
                 name=f"{what}, correlation",
@@ -132,6 +134,48 @@ def trust(effort: Effort, tell: Tell) -> Finding:
     return Finding(rows=rows, draw=lambda figure: full_wave_roughness.draw_on(figure, found))
 
 
+def _limiting_rows(one: full_wave_roughness.Comparison, wall: str) -> list[Row]:
+    """State what theory says of the smallest heights, where these are."""
+    rows = []
+    for where, level, expected, what in (
+        (
+            full_wave_roughness.BRAGG,
+            one.image_level_db,
+            full_wave_roughness.BRAGG_DB,
+            "image, level over full wave: perturbation theory",
+        ),
+        (
+            full_wave_roughness.EDGES,
+            one.echo_level_db,
+            full_wave_roughness.EDGES_DB,
+            "echo of the edges, level over full wave: Keller",
+        ),
+    ):
+        if (one.rms_mm, one.correlation_mm) in where:
+            rows.append(
+                Row(
+                    name=f"{wall}: {what}",
+                    stated=f"{expected:+.2f} dB",
+                    measured=level,
+                    unit="dB",
+                    low=expected - full_wave_roughness.LIMIT_TOLERANCE_DB,
+                    high=expected + full_wave_roughness.LIMIT_TOLERANCE_DB,
+                    origin="what is left of the heights there",
+                )
+            )
+    if one.rms_mm <= full_wave_roughness.SMALL_RMS_MM:
+        rows.append(
+            Row(
+                name=f"{wall}: pilot, correlation",
+                stated="a wave that hardly bends",
+                measured=one.uplink,
+                low=full_wave_roughness.SMALL_RMS_UPLINK,
+                origin="heights far below a wavelength",
+            )
+        )
+    return rows
+
+
 def located(effort: Effort, tell: Tell) -> Finding:
     """Locate the user on full-wave data of several realisations."""
     name = next(iter(full_wave_localization.CASES))
@@ -144,22 +188,39 @@ def located(effort: Effort, tell: Tell) -> Finding:
 
     found = full_wave_localization.localization(name, trials=trials, advance=advance)
     errors = error_summary(list(found.errors))
+    outside = sum(
+        one.full_wave.status != "found" or not one.full_wave.square < full_wave_localization.REGION
+        for one in found.trials
+    )
     return Finding(
         rows=[
             Row(
-                name=f"user on full-wave data, {name}: {what} of {trials}",
-                stated="as on simulated data",
-                measured=1e3 * value,
-                unit="mm",
-                high=1e3 * limit,
-                origin="the design's bounds of slam_2d",
-            )
-            for what, value, limit in (
-                ("median", errors.median, full_wave_localization.MOST_MEDIAN),
-                ("worst", errors.worst, full_wave_localization.MOST_WORST),
-            )
+                name=f"user on full-wave data, {name}: not found, or outside its region",
+                stated="found each time, its uncertainty told",
+                measured=float(outside),
+                high=0.0,
+                origin="the 99.9 % region",
+            ),
+            *_error_rows(name, errors, trials),
         ]
     )
+
+
+def _error_rows(name: str, errors: ErrorSummary, trials: int) -> list[Row]:
+    return [
+        Row(
+            name=f"user on full-wave data, {name}: {what} of {trials}",
+            stated="as on simulated data",
+            measured=1e3 * value,
+            unit="mm",
+            high=1e3 * limit,
+            origin="the design's bounds of slam_2d",
+        )
+        for what, value, limit in (
+            ("median", errors.median, full_wave_localization.MOST_MEDIAN),
+            ("worst", errors.worst, full_wave_localization.MOST_WORST),
+        )
+    ]
 
 
 CLAIMS = (

@@ -6,15 +6,14 @@ from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
 from scenes.library import load_scenario
-from scenes.scenario import Scenario, parse_scenario
+from scenes.scenario import Scenario
 from scenes.shapes import object_surface
 from simulator.facets import surface_facets
 from simulator.materials import Dielectric, reflection, transmission
 from simulator.permittivity import ConstantPermittivity
 from simulator.physical_optics import scattered
-from simulator.radio_scene import radio_scene
 from simulator.ray_scene import build_scene, facets_visible
-from validation.canonical_scatterers import ports
+from validation.canonical_scatterers import half_shadowed_plate, ports
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.path_solver import (
     LIMIT_AMPLITUDE,
@@ -27,32 +26,7 @@ from validation.path_solver import (
 
 def reciprocity(effort: Effort, tell: Tell) -> Finding:
     """Exchange transmitter and receiver over a rough plate, half in a post's shadow."""
-    scenario = parse_scenario(
-        {
-            "name": "plate",
-            "dimensions": 3,
-            "radio": {"start_ghz": 220.0, "stop_ghz": 295.0, "points": 21},
-            "base_station": {"elements": 1, "spacing_mm": 0.5},
-            "objects": {
-                "plate": {
-                    "kind": "plate",
-                    "material": "drywall",
-                    "centre_m": [0.0, 0.3],
-                    "length_m": 0.01,
-                    "height_m": 0.01,
-                    "roughness": {"rms_mm": 0.1, "correlation_mm": 0.4},
-                },
-                "post": {
-                    "kind": "cylinder",
-                    "material": "metal",
-                    "centre_m": [0.002, 0.29],
-                    "radius_m": 0.002,
-                    "height_m": 0.005,
-                },
-            },
-        }
-    )
-    made = radio_scene(scenario, seed=1, sample=0)
+    made = half_shadowed_plate()
     facets = made.facets
     if facets is None:
         raise ValueError("the scene has no facets; give it a scattering object")
@@ -60,7 +34,7 @@ def reciprocity(effort: Effort, tell: Tell) -> Finding:
     one, other = (
         ports(end[None], facets, facets_visible(made.rays, facets, end[None])) for end in ends
     )
-    frequencies = scenario.radio.frequencies
+    frequencies = made.scenario.radio.frequencies
     there = scattered(facets, one, other, frequencies, waves="spherical")
     back = scattered(facets, other, one, frequencies, waves="spherical")
     tell(1, 1)

@@ -64,6 +64,9 @@ CASES: dict[str, tuple[str, tuple[tuple[float, float], ...]]] = {
 }
 """Scenario, and where the user stands [m]."""
 
+EXACT_IN_SIGHT = ("ToA, 4 anchors", "AoA+ToA, no map")
+"""Methods that nothing hinders in line of sight."""
+
 SURVEYED = ("RSSI/AoA fingerprints",)
 MILLIMETRE, MOST = 1e-3, 5e-3
 DECIMETRES = 0.1
@@ -161,7 +164,7 @@ def check(trials: Sequence[Trial]) -> list[str]:
                     claim = "centimetres to decimetres"
             elif not least > DECIMETRES:
                 claim = "decimetres at least, or no answer"
-        elif case == SIGHT and method in ("ToA, 4 anchors", "AoA+ToA, no map"):
+        elif case == SIGHT and method in EXACT_IN_SIGHT:
             if not summary.worst < MILLIMETRE:
                 claim = "less than a millimetre"
         if claim:

@@ -33,7 +33,6 @@ Claims that are asserted: each measured number is theory's.
 import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
@@ -49,7 +48,7 @@ from validation.design_numbers import (
     Number,
     measured_numbers,
 )
-from validation.row_table import conclude
+from validation.row_table import conclude_with_figure
 
 
 def measure() -> DesignNumbers:
@@ -131,11 +130,7 @@ def main(arguments: list[str]) -> None:
     """Measure, draw, print the figures and check them."""
     path = Path(arguments[0] if arguments else "eq02_design_numbers.png")
     result = measure()
-    figure = plt.figure(figsize=(11, 8), layout="constrained")
-    draw(figure, result)
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(rows(result))
+    conclude_with_figure(path, (11, 8), lambda figure: draw(figure, result), rows(result))
 
 
 if __name__ == "__main__":

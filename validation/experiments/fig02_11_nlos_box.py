@@ -18,13 +18,9 @@ range and a resolution cell across; no other target is within 10 dB of it.
 """
 
 import sys
-from pathlib import Path
-
-import matplotlib.pyplot as plt
 
 from scenes.library import load_scenario
-from validation.hidden_imaging import HiddenImaging, draw_hidden, hidden_rows, measure_hidden
-from validation.row_table import conclude
+from validation.hidden_imaging import HiddenImaging, conclude_hidden, measure_hidden
 
 HALF_SIZE = (
     "base_station.elements=121",
@@ -48,14 +44,7 @@ def measure(*, seed: int = 0, quick: bool = False) -> HiddenImaging:
 
 def main(arguments: list[str]) -> None:
     """Simulate, draw the first realisation, print the figures and check them."""
-    path = Path(arguments[0] if arguments else "fig02_11_nlos_box.png")
-    seeds = int(arguments[1]) if len(arguments) > 1 else 1
-    results = [measure(seed=seed) for seed in range(seeds)]
-    figure = plt.figure(figsize=(12.5, 6.4), layout="constrained")
-    draw_hidden(figure, results[0])
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(hidden_rows(results))
+    conclude_hidden(arguments, "fig02_11_nlos_box", measure)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
@@ -34,7 +33,7 @@ from scenes.library import load_scenario
 from simulator.simulation import simulate
 from validation.claim import Row
 from validation.point_response import peak_cut
-from validation.row_table import conclude
+from validation.row_table import conclude_with_figure
 
 DISTANCE = 0.15
 USER = "beam_90"
@@ -159,11 +158,7 @@ def main(arguments: list[str]) -> None:
     """Simulate, draw, print the figures and check them."""
     path = Path(arguments[0] if arguments else "fig04_01_gaussian_beam.png")
     result = measure()
-    figure = plt.figure(figsize=(10, 4.2), layout="constrained")
-    draw(figure, result)
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(rows(result))
+    conclude_with_figure(path, (10, 4.2), lambda figure: draw(figure, result), rows(result))
 
 
 if __name__ == "__main__":

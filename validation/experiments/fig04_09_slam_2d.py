@@ -23,7 +23,6 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
@@ -47,7 +46,7 @@ from validation.hidden_user import (
 )
 from validation.point_response import PeakCut, peak_cut
 from validation.resolution_bars import draw_resolution_bars
-from validation.row_table import conclude
+from validation.row_table import conclude_with_figure
 
 SEEDS, QUICK_SEEDS = 10, 3
 MEDIAN, WORST = 0.4e-3, 1.0e-3
@@ -259,11 +258,7 @@ def main(arguments: list[str]) -> None:
     path = Path(arguments[0] if arguments else "fig04_09_slam_2d.png")
     seeds = int(arguments[1]) if len(arguments) > 1 else SEEDS
     result = measure(seeds=seeds, tell=lambda done, count: print(f"{done} of {count}", flush=True))
-    figure = plt.figure(figsize=(16, 9.5), layout="constrained")
-    draw(figure, result)
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(rows(result))
+    conclude_with_figure(path, (16, 9.5), lambda figure: draw(figure, result), rows(result))
 
 
 if __name__ == "__main__":

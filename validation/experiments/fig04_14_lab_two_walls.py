@@ -25,7 +25,6 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -42,7 +41,7 @@ from validation.hidden_user import (
     user_rows,
     wall_rows,
 )
-from validation.row_table import conclude
+from validation.row_table import conclude_with_figure
 from validation.scenario_plan import draw_scenario
 
 WALLS = ("drywall_1", "drywall_2")
@@ -143,11 +142,7 @@ def main(arguments: list[str]) -> None:
     path = Path(arguments[0] if arguments else "fig04_14_lab_two_walls.png")
     seeds = int(arguments[1]) if len(arguments) > 1 else 1
     result = measure(seeds=seeds, tell=lambda done, count: print(f"{done} of {count}", flush=True))
-    figure = plt.figure(figsize=(16, 10.5), layout="constrained")
-    draw(figure, result)
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(rows(result))
+    conclude_with_figure(path, (16, 10.5), lambda figure: draw(figure, result), rows(result))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Complex, Float
 from matplotlib.figure import Figure
@@ -37,7 +36,7 @@ from simulator.simulation import simulate
 from validation.claim import Row
 from validation.point_response import peak_cut
 from validation.point_scatterer import point_echo, point_uplink
-from validation.row_table import conclude
+from validation.row_table import conclude_with_figure
 
 CELLS_OFF = 0.05
 WIDTHS_WITHIN = 0.05
@@ -352,11 +351,7 @@ def main(arguments: list[str]) -> None:
     """Measure, draw, print the figures and check them."""
     path = Path(arguments[0] if arguments else "simulator_on_points.png")
     results = measure()
-    figure = plt.figure(figsize=(10, 4.4), layout="constrained")
-    draw(figure, results)
-    figure.savefig(path, dpi=150)
-    print(f"written: {path}")
-    conclude(rows(results))
+    conclude_with_figure(path, (10, 4.4), lambda figure: draw(figure, results), rows(results))
 
 
 if __name__ == "__main__":

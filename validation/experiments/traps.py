@@ -28,7 +28,7 @@ from estimator.localization import locate
 from scenes.library import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import normalised_square
-from validation.metrics import nearest_wall, wall_error
+from validation.metrics import distances_from_segment, nearest_wall, wall_error
 from validation.truth import Truth, truth_from_dataset
 
 SEEDS = 3
@@ -369,7 +369,7 @@ def _seen(mirror: Mirror, truth: Truth) -> SeenMirror:
     nearest = wall_error(mirror, name, truth.wall_start[name], truth.wall_end[name])
     places = np.linspace(mirror.start, mirror.end, 41)
     distances = [
-        _from_segment(places, truth.wall_start[one], truth.wall_end[one])
+        distances_from_segment(places, truth.wall_start[one], truth.wall_end[one])
         for one in truth.wall_start
     ]
     on_walls = np.mean(np.min(distances, axis=0) < ON_WALL)
@@ -380,16 +380,6 @@ def _seen(mirror: Mirror, truth: Truth) -> SeenMirror:
         offset=nearest.offset,
         confidence=mirror.confidence,
     )
-
-
-def _from_segment(
-    points: Float[np.ndarray, "points 3"],
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-) -> Float[np.ndarray, " points"]:
-    along = end - start
-    share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - (start + share[:, None] * along), axis=-1))
 
 
 def table_row(name: str, seed: int, result: Trial) -> str:
