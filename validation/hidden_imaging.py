@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -41,13 +41,6 @@ PEAK_WITHIN = 8e-3
 """Where the corrected image's peak is looked for around a true front face: two cells. [m]"""
 
 
-class MeasureSeed(Protocol):
-    """Simulates and images one realisation."""
-
-    def __call__(self, *, seed: int) -> "HiddenImaging":
-        """Do so for a seed."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class HiddenTarget:
     """One hidden object: where it was found, beside where its front face is."""
@@ -79,6 +72,14 @@ class HiddenImaging:
     def false(self) -> int:
         """False targets that an eye would take for true ones."""
         return sum(level > FALSE_DB for level in self.false_levels_db)
+
+
+@runtime_checkable
+class MeasureSeed(Protocol):
+    """Simulates and images one realisation."""
+
+    def __call__(self, *, seed: int) -> HiddenImaging:
+        """Do so for a seed."""
 
 
 def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging:
