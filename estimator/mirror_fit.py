@@ -68,7 +68,10 @@ SUMMIT = 0.6
 CELLS_CUT = 2.0
 """Cells left out at either end: the sidelobes of an end, which lean, would tilt the line."""
 CELLS_AT_END = 12.0
-"""Cells whose mean is the level of the wall near its end."""
+"""Cells either side of a wall's rough end that are searched for it."""
+CELLS_OF_STEP = 3.0
+"""Cells either side of an end whose mean levels differ most: speckle in so many leaves their mean
+a deviation of 3 dB, and walls end by tens of decibels."""
 END_LEVEL = 0.1
 """Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
 of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
@@ -279,20 +282,47 @@ def _extent(
     level = float(np.median(intensity[within])) / np.log(2)
     background = _levels(focus, start, end, resolution)[1]
     # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
-    occupied = np.nonzero(intensity > np.sqrt(level * background))[0]
+    halfway = np.sqrt(level * background)
+    occupied = np.nonzero(intensity > halfway)[0]
     if not within.any() or level < background or len(occupied) == 0:
         return None
     runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
     run = max(runs, key=len)
     if len(run) < 2 or len(run) < 0.3 * (run[-1] - run[0] + 1):
         return None
-    near = round(CELLS_AT_END * SAMPLES_PER_CELL)
-    ends = []
-    for inward in (run, run[::-1]):
-        local = intensity[inward[:near]]
-        bright = inward[:near][local > END_LEVEL * np.median(local) / np.log(2)]
-        ends.append(middle + places[bright[0]] * along)
-    return ends[0], ends[1]
+    level_db = 10 * np.log10(np.maximum(intensity, halfway))
+    outermost = len(places) - 1
+    first = _end_of(level_db, int(run[0]))
+    last = outermost - _end_of(level_db[::-1], outermost - int(run[-1]))
+    if last - first < 2:
+        return None
+    return middle + places[first] * along, middle + places[last] * along
+
+
+def _end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:
+    """Return the first place that is wall, on a line that comes from outside.
+
+    The end is the highest step between the means, in decibels, of the cells before it and after.
+    What is scattered twice around a face that is seen over a mirror is a dim shoulder before its
+    end; a face may also be tens of decibels brighter in its middle than at its ends.
+
+    Parameters
+    ----------
+    level_db
+        Intensity from outside to inside; not below what counts as dark. [dB]
+    rough
+        About where the wall begins.
+    """
+    near, wide = round(CELLS_AT_END * SAMPLES_PER_CELL), round(CELLS_OF_STEP * SAMPLES_PER_CELL)
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(level_db, wide, mode="edge"))])
+    means = (sums[wide:] - sums[:-wide]) / wide
+    steps = means[wide:-1] - means[: -wide - 1]  # after place i, less before it
+    start = max(0, rough - near)
+    step = start + int(np.argmax(steps[start : rough + near]))
+    # A minimum of the speckle may be a higher step than the wall's end, a few cells further out.
+    enough = np.median(level_db[step : step + near]) + 10 * np.log10(END_LEVEL / np.log(2))
+    outer = max(0, step - 2 * wide)
+    return outer + int(np.argmax(np.append(level_db[outer:step] > enough, True)))
 
 
 def _summit(
