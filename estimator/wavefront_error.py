@@ -27,6 +27,11 @@ patches so late or so far off that the fit does not see them."""
 DELAYS = (1, 3)
 """Modes over the aperture that tell, in the first mode over the band, the level of a delay."""
 
+TILT_SHARE, DELAY_SHARE = 0.8, 0.5
+"""Variance of a tilt and of a delay over the level that these modes tell. From 56 realisations of
+four walls (20 to 40 cm, 0.01 to 0.1 mm rms, 30 and 75 GHz): 0.6 to 1.0, and 0.2 to 0.55; lowest
+where the wall is longest, as its far patches come too late to touch the first mode."""
+
 MANY = 40
 """Last mode that tells whether there is anything beside noise at all."""
 SIGNIFICANT = 0.99
@@ -89,7 +94,7 @@ def wavefront_error(
         _excess(row, first, last, white)
         for row, (first, last) in zip(modes, (TILTS, DELAYS), strict=True)
     )
-    return WavefrontError(mean=tilts, slope=delays)
+    return WavefrontError(mean=TILT_SHARE * tilts, slope=DELAY_SHARE * delays)
 
 
 def _excess(modes: Float[np.ndarray, " elements"], first: int, last: int, white: float) -> float:

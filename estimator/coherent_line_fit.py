@@ -1,0 +1,225 @@
+r"""A wall's line from the phases of its whole echo, whatever its speckle is.
+
+A straight rough wall is a row of scatterers of unknown strengths :math:`\gamma_i`, so its echo,
+as range profiles of each antenna position, is
+
+.. math:: d = A(\alpha, \rho)\, \gamma + \text{rest}, \qquad
+          A_{(m,b),i} = D(r_b - r_{mi})\, e^{-j 4 \pi f_c r_{mi} / c}
+
+with Dirichlet's kernel D of the sweep. Scatterers finer than a resolution cell can give any
+speckle, and still only a small part of all possible data: a line that is turned or moved by a
+fraction of a cell cannot explain the echo. The least squares over strengths, angle and offset
+together (variable projection, in Kaufman's approximation [1]_) are free of what moves the
+brightest line of an image: each cell's speckle in its neighbours' sidelobes, levels that change
+along the wall, and its ends.
+
+What is left is noise and what the wall's own heights do beyond first order; both push the line
+independently from place to place, so the covariance follows from the pushes themselves.
+
+References
+----------
+.. [1] L. Kaufman, "A variable projection method for solving separable nonlinear least squares
+       problems", BIT 15, 49-57 (1975), doi:10.1007/BF01932995
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.linalg import cho_factor, cho_solve
+
+from estimator.measurement import Echo
+
+SCATTERERS_PER_CELL = 1.8
+"""Along the wall. From 1.6 on, more change nothing; one a cell cannot give every speckle."""
+RANGE_MARGIN = 10
+"""Bins of the range profiles before the nearest scatterer and beyond the farthest."""
+SECTOR_MARGIN = 1.25
+"""Sines from one edge of the wall to the other that antenna positions must tell apart, over
+those that it takes. [-]"""
+RIDGE = 1e-6
+"""Added to the scatterers' Gram matrix, over its mean diagonal: finer than a cell they are not
+independent."""
+STEPS = 2
+"""Gauss-Newton steps: from a hundredth of a cell the first leaves less than a thousandth."""
+FARTHEST_STEP = 0.5
+"""A step that moves an end by more says that the row explains something else. [cells]"""
+FEWEST_SCATTERERS = 12
+"""A shorter row is a point's neighbourhood."""
+PUSH_SHARE = 1.3
+"""Variance of tilt and offset over what independent pushes give: slow ones are somewhat stronger,
+as a wall's heights are correlated. From 108 realisations of six walls (20 to 40 cm, 20° and 45°,
+0.01 to 0.1 mm rms, metal and drywall, 30 and 75 GHz): 0.7 to 1.8."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoherentLine:
+    """A segment in the array's frame, with the statistics of its angle and offset."""
+
+    start: Float[np.ndarray, " 3"]  # [m]
+    end: Float[np.ndarray, " 3"]  # [m]
+    covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
+
+
+def fit_coherently(
+    echo: Echo,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    *,
+    cell_along: float,
+    cell_across: float,
+    beyond: tuple[float, float] = (0.0, 0.0),
+) -> CoherentLine | None:
+    """Refine a wall's line that is known to a small part of a cell.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame; monostatic, of uniform frequencies.
+    start, end
+        The line. [m]
+    cell_along, cell_across
+        Resolution along the wall and across it, at half power. [m]
+    beyond
+        How much longer the wall may be than what is found of it, before its start and beyond
+        its end: what its row does not hold would be explained by a turn. [m]
+
+    Returns
+    -------
+    The line, with the same length; ``None`` where it is too short, or where the echo is not that
+    of a row of scatterers nearby.
+    """
+    length = float(np.linalg.norm(end - start))
+    low, high = (-0.5 * length - beyond[0], 0.5 * length + beyond[1])
+    count = int(np.ceil(SCATTERERS_PER_CELL * (high - low) / cell_along))
+    if length * SCATTERERS_PER_CELL < FEWEST_SCATTERERS * cell_along:
+        return None
+    places = low + (np.arange(count) + 0.5) / count * (high - low)
+    levers = 2 * places / length
+    thinned = _thinned(echo, start, end)
+    profiles = _profiles(thinned, start, end)
+    first = (start, end)
+    for _ in range(STEPS):
+        echoes, slopes = _model(thinned, profiles, start, end, places)
+        adjoint = echoes.conj().T
+        gram = adjoint @ echoes
+        gram[np.diag_indices(count)] += RIDGE * np.trace(gram).real / count
+        solved = cho_factor(gram, lower=True)
+        data = profiles.values.ravel()
+        strengths = cho_solve(solved, adjoint @ data)
+        left = data - echoes @ strengths
+        moved = np.stack([slopes @ strengths, slopes @ (strengths * levers)], axis=-1)
+        moved -= echoes @ cho_solve(solved, adjoint @ moved)
+        stiffness = (moved.conj().T @ moved).real
+        step = np.linalg.solve(stiffness, (moved.conj().T @ left).real)
+        start, end = _moved(start, end, step)
+        if max(np.linalg.norm(start - first[0]), np.linalg.norm(end - first[1])) > (
+            FARTHEST_STEP * cell_across
+        ):
+            return None
+    pushes = ((slopes * strengths).conj().T @ left).real
+    columns = np.stack([pushes, pushes * levers])
+    softness = np.linalg.inv(stiffness)
+    # Of (offset, displacement of the ends), whatever each place's own variance is.
+    by_step = PUSH_SHARE * softness @ columns @ columns.T @ softness
+    # An end that moves along the normal by δ turns the line by −2δ over its length.
+    to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
+    return CoherentLine(start=start, end=end, covariance=to_angle @ by_step @ to_angle.T)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Profiles:
+    """Range profiles of a part of the echo, each relative to the band's centre."""
+
+    values: Complex[np.ndarray, "positions bins"]
+    ranges: Float[np.ndarray, " bins"]  # [m]
+
+
+def _across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> np.ndarray:
+    along = (end - start) / np.linalg.norm(end - start)
+    return np.array([along[1], -along[0], 0.0])
+
+
+def _moved(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], step: Float[np.ndarray, " 2"]
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Displace a line along its normal, and its ends by so much more and less."""
+    normal = _across(start, end)
+    return start + (step[0] - step[1]) * normal, end + (step[0] + step[1]) * normal
+
+
+def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Echo:
+    """Leave out antenna positions that tell nothing more about so narrow a sector."""
+    x = echo.positions[:, 0]
+    sines = [
+        (end_x - x) / np.hypot(end_x - x, end_y)
+        for end_x, end_y in (start[:2].tolist(), end[:2].tolist())
+    ]
+    span = float(np.max(np.abs(sines[0] - sines[1])))
+    wavelength = speed_of_light / float(echo.frequencies[-1])
+    spacing = float(np.median(np.abs(np.diff(np.sort(x))))) if len(x) > 1 else wavelength
+    every = max(1, int(wavelength / (2 * SECTOR_MARGIN * span * spacing)))
+    return Echo(
+        samples=echo.samples[::every],
+        positions=echo.positions[::every],
+        frequencies=echo.frequencies,
+    )
+
+
+def _bandwidth_step(echo: Echo) -> tuple[float, float, int]:
+    """Return the centre frequency of the kernel, the step, and the number of frequencies."""
+    count = len(echo.frequencies)
+    step = float(echo.frequencies[-1] - echo.frequencies[0]) / (count - 1)
+    return float(echo.frequencies[0]) + 0.5 * (count - 1) * step, step, count
+
+
+def _profiles(
+    echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
+) -> _Profiles:
+    """Range profiles around the wall, at the sweep's own independent ranges."""
+    centre, step, count = _bandwidth_step(echo)
+    bin_width = speed_of_light / (2 * count * step)
+    points = np.linspace(start, end, 33)
+    ranges = np.linalg.norm(points[:, None] - echo.positions[None], axis=-1)
+    low = int(np.floor(ranges.min() / bin_width)) - RANGE_MARGIN
+    high = int(np.ceil(ranges.max() / bin_width)) + RANGE_MARGIN
+    bins = np.arange(low, min(high, low + count - 1) + 1) * bin_width
+    offsets = echo.frequencies - centre
+    turns = np.exp(4j * np.pi / speed_of_light * np.outer(offsets, bins)) / np.sqrt(count)
+    return _Profiles(values=echo.samples @ turns, ranges=bins)
+
+
+def _model(
+    echo: Echo,
+    profiles: _Profiles,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    places: Float[np.ndarray, " places"],
+) -> tuple[Complex[np.ndarray, "rows places"], Complex[np.ndarray, "rows places"]]:
+    """Return each scatterer's range profiles, and their slopes along the wall's normal [1/m]."""
+    centre, step, count = _bandwidth_step(echo)
+    along = (end - start) / np.linalg.norm(end - start)
+    points = 0.5 * (start + end) + places[:, None] * along
+    ways = points[None] - echo.positions[:, None]
+    ranges = np.linalg.norm(ways, axis=-1)
+    closing = (ways @ _across(start, end)) / ranges  # of the range, over that of the line
+    # Dirichlet's kernel about the band's centre is real: the sum over the sweep's frequencies,
+    # sin(Nx)/sin(x). Bins are π/N apart in x, so that N times as much needs no sine of each bin.
+    per_range = 2 * np.pi * step / speed_of_light
+    bins, way = per_range * profiles.ranges[:, None], (per_range * ranges)[:, None, :]
+    sine = np.sin(bins) * np.cos(way) - np.cos(bins) * np.sin(way)
+    cosine = np.cos(bins) * np.cos(way) + np.sin(bins) * np.sin(way)
+    turned = np.cos(count * bins)  # 1 or -1 where the bins are the sweep's own
+    on_bin = np.abs(sine) < 1e-7
+    sine[on_bin] = 1.0
+    kernel = -turned * np.sin(count * way) / sine
+    kernel[on_bin] = count
+    slope = (turned * np.cos(count * way) * count - kernel * cosine) / sine * per_range
+    slope[on_bin] = 0.0
+    wavenumber = 4 * np.pi * centre / speed_of_light
+    carrier = np.exp(-1j * wavenumber * ranges)[:, None, :] / np.sqrt(count)
+    rows = -1, len(places)
+    echoes = (kernel * carrier).reshape(rows)
+    slopes = ((-slope - 1j * wavenumber * kernel) * (carrier * closing[:, None, :])).reshape(rows)
+    return echoes, slopes
