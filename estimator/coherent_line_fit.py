@@ -70,6 +70,7 @@ def fit_coherently(
     cell_along: float,
     cell_across: float,
     beyond: tuple[float, float] = (0.0, 0.0),
+    others: Float[np.ndarray, "others 3"] | None = None,
 ) -> CoherentLine | None:
     """Refine a wall's line that is known to a small part of a cell.
 
@@ -84,6 +85,9 @@ def fit_coherently(
     beyond
         How much longer the wall may be than what is found of it, before its start and beyond
         its end: what its row does not hold would be explained by a turn. [m]
+    others
+        Scatterers at known places that send echoes from the same ranges, with unknown strengths
+        of their own. [m]
 
     Returns
     -------
@@ -99,16 +103,26 @@ def fit_coherently(
     levers = 2 * places / length
     thinned = _thinned(echo, start, end)
     profiles = _profiles(thinned, start, end)
+    beside = None if others is None or len(others) == 0 else _echoes(thinned, profiles, others)[0]
+    data = profiles.values.ravel()
     first = (start, end)
     for _ in range(STEPS):
-        echoes, slopes = _model(thinned, profiles, start, end, places)
+        along = (end - start) / length
+        row = 0.5 * (start + end) + places[:, None] * along
+        echoes, by_range = _echoes(thinned, profiles, row)
+        ways = row[None] - thinned.positions[:, None]
+        # Of the range, over that of the line along its normal.
+        closing = ways @ _across(start, end) / np.linalg.norm(ways, axis=-1)
+        slopes = by_range * np.repeat(closing, len(profiles.ranges), axis=0)
+        if beside is not None:
+            echoes = np.concatenate([echoes, beside], axis=1)
         adjoint = echoes.conj().T
         gram = adjoint @ echoes
-        gram[np.diag_indices(count)] += RIDGE * np.trace(gram).real / count
+        gram[np.diag_indices(len(gram))] += RIDGE * np.trace(gram).real / len(gram)
         solved = cho_factor(gram, lower=True)
-        data = profiles.values.ravel()
-        strengths = cho_solve(solved, adjoint @ data)
-        left = data - echoes @ strengths
+        all_strengths = cho_solve(solved, adjoint @ data)
+        left = data - echoes @ all_strengths
+        strengths = all_strengths[:count]
         moved = np.stack([slopes @ strengths, slopes @ (strengths * levers)], axis=-1)
         moved -= echoes @ cho_solve(solved, adjoint @ moved)
         stiffness = (moved.conj().T @ moved).real
@@ -167,8 +181,8 @@ def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, 
     )
 
 
-def _bandwidth_step(echo: Echo) -> tuple[float, float, int]:
-    """Return the centre frequency of the kernel, the step, and the number of frequencies."""
+def _sweep(echo: Echo) -> tuple[float, float, int]:
+    """Return the band's centre, its step, and the number of frequencies."""
     count = len(echo.frequencies)
     step = float(echo.frequencies[-1] - echo.frequencies[0]) / (count - 1)
     return float(echo.frequencies[0]) + 0.5 * (count - 1) * step, step, count
@@ -178,7 +192,7 @@ def _profiles(
     echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
 ) -> _Profiles:
     """Range profiles around the wall, at the sweep's own independent ranges."""
-    centre, step, count = _bandwidth_step(echo)
+    centre, step, count = _sweep(echo)
     bin_width = speed_of_light / (2 * count * step)
     points = np.linspace(start, end, 33)
     ranges = np.linalg.norm(points[:, None] - echo.positions[None], axis=-1)
@@ -190,20 +204,12 @@ def _profiles(
     return _Profiles(values=echo.samples @ turns, ranges=bins)
 
 
-def _model(
-    echo: Echo,
-    profiles: _Profiles,
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-    places: Float[np.ndarray, " places"],
-) -> tuple[Complex[np.ndarray, "rows places"], Complex[np.ndarray, "rows places"]]:
-    """Return each scatterer's range profiles, and their slopes along the wall's normal [1/m]."""
-    centre, step, count = _bandwidth_step(echo)
-    along = (end - start) / np.linalg.norm(end - start)
-    points = 0.5 * (start + end) + places[:, None] * along
-    ways = points[None] - echo.positions[:, None]
-    ranges = np.linalg.norm(ways, axis=-1)
-    closing = (ways @ _across(start, end)) / ranges  # of the range, over that of the line
+def _echoes(
+    echo: Echo, profiles: _Profiles, points: Float[np.ndarray, "points 3"]
+) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
+    """Return each scatterer's range profiles, and their slopes over its range [1/m]."""
+    centre, step, count = _sweep(echo)
+    ranges = np.linalg.norm(points[None] - echo.positions[:, None], axis=-1)
     # Dirichlet's kernel about the band's centre is real: the sum over the sweep's frequencies,
     # sin(Nx)/sin(x). Bins are π/N apart in x, so that N times as much needs no sine of each bin.
     per_range = 2 * np.pi * step / speed_of_light
@@ -219,7 +225,6 @@ def _model(
     slope[on_bin] = 0.0
     wavenumber = 4 * np.pi * centre / speed_of_light
     carrier = np.exp(-1j * wavenumber * ranges)[:, None, :] / np.sqrt(count)
-    rows = -1, len(places)
-    echoes = (kernel * carrier).reshape(rows)
-    slopes = ((-slope - 1j * wavenumber * kernel) * (carrier * closing[:, None, :])).reshape(rows)
-    return echoes, slopes
+    rows = -1, len(points)
+    by_range = (-slope - 1j * wavenumber * kernel) * carrier
+    return (kernel * carrier).reshape(rows), by_range.reshape(rows)

@@ -8,7 +8,6 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import Focuser, backproject, focus, prepare
-from estimator.coherent_line_fit import fit_coherently
 from estimator.line_search import LineCandidate, Resolution, find_lines, significant_peaks
 from estimator.measurement import Echo, MeasurementError, frequency_step
 from estimator.mirror_fit import FittedLine, Focus, fit_between, fit_line
@@ -48,12 +47,6 @@ LEAST_CONTRAST = 10.0
 LEAST_CONFIDENCE = 0.999
 LEAST_CELLS = 8.0
 """Shortest mirror; shorter ones have no angle to speak of. [cells]"""
-
-
-LINE_MARGIN = 4.0
-"""Cells by which a wall may be longer than its line at either end. [cells]"""
-CUT_SHARE = 0.3
-"""Part of its length by which a wall may go on where the unambiguous range ends. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,32 +206,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
             continue
         if _is_hidden(line, in_sight) and not _is_edge_on(line, half):
             in_sight.append(line)
-    refined = [_refined_by_echo(echo, line) for line in in_sight]
-    return tuple(sorted(refined, key=lambda line: -line.level))
-
-
-def _refined_by_echo(echo: Echo, line: FittedLine) -> FittedLine:
-    """Place a line as the whole echo says, if it looks like that of a straight rough wall."""
-    resolution, farthest = echo_resolution(echo), echo_reach(echo)[1]
-    along = float(resolution.cell(line.middle, line.direction))
-    beyond = [
-        CUT_SHARE * line.length
-        if np.linalg.norm(tip) > farthest - LINE_MARGIN * along
-        else LINE_MARGIN * along
-        for tip in (line.start, line.end)
-    ]
-    normal = np.array([line.direction[1], -line.direction[0], 0.0])
-    found = fit_coherently(
-        echo,
-        line.start,
-        line.end,
-        cell_along=along,
-        cell_across=float(resolution.cell(line.middle, normal)),
-        beyond=(beyond[0], beyond[1]),
-    )
-    if found is None:
-        return line
-    return replace(line, start=found.start, end=found.end, covariance=found.covariance)
+    return tuple(sorted(in_sight, key=lambda line: -line.level))
 
 
 def _fitted(

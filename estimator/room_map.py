@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from estimator.array_frame import ArrayFrame
 from estimator.estimate import Mirror, Target
+from estimator.line_refinement import refine_by_echo
 from estimator.measurement import Echo
 from estimator.mirror_fit import FittedLine
 from estimator.mirrors import Survey, detect_mirrors, echo_resolution, loose_peaks, survey
@@ -43,7 +44,7 @@ def build_room_map(echo: Echo) -> RoomMap:
     The map, in the same frame.
     """
     looked = survey(echo)
-    found = detect_mirrors(echo, looked)
+    found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
     resolution = echo_resolution(echo)
     folded = fold_seen_lines(found, resolution)
     aperture = float(np.ptp(echo.positions[:, 0]))

@@ -8,6 +8,7 @@ import pytest
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator.line_refinement import refine_by_echo
 from estimator.measurement import Echo, MeasurementError
 from estimator.mirror_fit import FittedLine
 from estimator.mirrors import (
@@ -25,7 +26,8 @@ WALLS = 12
 
 
 def found(echo: Echo) -> tuple[FittedLine, ...]:
-    return detect_mirrors(echo, survey(echo))
+    looked = survey(echo)
+    return refine_by_echo(echo, looked, detect_mirrors(echo, looked))
 
 
 def angle_of(line: FittedLine) -> float:

@@ -1,0 +1,110 @@
+"""From the lines of the image to lines that explain the echo itself."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.backprojection import prepare
+from estimator.coherent_line_fit import fit_coherently
+from estimator.line_search import Resolution
+from estimator.measurement import Echo
+from estimator.mirror_fit import FittedLine, Focus
+from estimator.mirrors import (
+    Survey,
+    coarse_resolution,
+    echo_reach,
+    echo_resolution,
+    focus_within,
+    lies_on,
+)
+from estimator.range_profiles import range_profiles
+from estimator.windows import survey_weights
+
+LINE_MARGIN = 4.0
+"""Cells by which a wall may be longer than its line at either end. [cells]"""
+MOST_BESIDE = 12
+"""Things brighter than a wall that are told apart from its echo; weaker ones do not pull it."""
+CUT_SHARE = 0.3
+"""Part of its length by which a wall may go on where the unambiguous range ends. [-]"""
+
+
+def refine_by_echo(
+    echo: Echo, looked: Survey, lines: Sequence[FittedLine]
+) -> tuple[FittedLine, ...]:
+    """Place lines as the whole echo says; see :mod:`estimator.coherent_line_fit`.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+    looked
+        Its survey: what is bright beside a line has a part in the echo from the same ranges.
+    lines
+        As fitted to the image.
+
+    Returns
+    -------
+    The lines in the same order. One whose echo is not that of a straight rough wall is left.
+    """
+    tapered = focus_within(
+        prepare(range_profiles(echo, weights=survey_weights(echo))), echo_reach(echo)[1]
+    )
+    places, levels = _bright_beside(
+        looked.peaks, lines, tapered, coarse_resolution(echo_resolution(echo))
+    )
+    return tuple(_refined(echo, line, places[levels > line.level]) for line in lines)
+
+
+def _bright_beside(
+    peaks: Float[np.ndarray, "peaks 3"],
+    lines: Sequence[FittedLine],
+    tapered: Focus,
+    coarse: Resolution,
+) -> tuple[Float[np.ndarray, "points 9 3"], Float[np.ndarray, " points"]]:
+    """Return the brightest peaks that are on no line, and their intensities.
+
+    Each is a few points, half a cell apart: what stands there is no ideal point.
+    """
+    beside = np.array(
+        [p for p in peaks if not any(lies_on(p, line, coarse, margin=4.0) for line in lines)]
+    ).reshape(-1, 3)
+    intensity = np.abs(tapered(beside)) ** 2
+    brightest = np.argsort(-intensity)[:MOST_BESIDE]
+    beside = beside[brightest]
+    distance = np.linalg.norm(beside, axis=-1, keepdims=True)
+    ray = beside / distance
+    across = np.stack([ray[:, 1], -ray[:, 0], ray[:, 2]], axis=-1) * distance * coarse.across_ray
+    steps = np.array([-0.5, 0.0, 0.5])
+    grid = (
+        beside[:, None, None]
+        + steps[:, None, None] * coarse.along_ray * ray[:, None, None]
+        + steps[:, None] * across[:, None, None]
+    )
+    return grid.reshape(-1, 9, 3), intensity[brightest]
+
+
+def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3"]) -> FittedLine:
+    """Place a line as the whole echo says, if it looks like that of a straight rough wall."""
+    resolution, farthest = echo_resolution(echo), echo_reach(echo)[1]
+    along = float(resolution.cell(line.middle, line.direction))
+    beyond = [
+        CUT_SHARE * line.length
+        if np.linalg.norm(tip) > farthest - LINE_MARGIN * along
+        else LINE_MARGIN * along
+        for tip in (line.start, line.end)
+    ]
+    normal = np.array([line.direction[1], -line.direction[0], 0.0])
+    found = fit_coherently(
+        echo,
+        line.start,
+        line.end,
+        cell_along=along,
+        cell_across=float(resolution.cell(line.middle, normal)),
+        beyond=(beyond[0], beyond[1]),
+        others=others.reshape(-1, 3),
+    )
+    if found is None:
+        return line
+    return replace(line, start=found.start, end=found.end, covariance=found.covariance)
