@@ -28,7 +28,8 @@ from simulator.truth import scenario_truth
 from validation.echo_line_bound import wall_covariance_bound
 from validation.metrics import position_error, wall_errors
 from validation.noise_free import content_key, noise_free, with_receiver
-from validation.scenario_bound import scenario_position_bound
+from validation.roughness_floor import roughness_floor
+from validation.scenario_bound import scenario_position_bound, user_waves
 from validation.truth import Truth, truth_from_dataset
 
 PACKAGES = ("scenes", "simulator", "estimator", "validation")
@@ -111,7 +112,7 @@ class Outcome:
     error: float | None  # [m]
     deviation: float | None  # that the estimate claims for itself [m]
     bound: float | None  # position error bound, the walls known [m]
-    bound_with_walls: float | None  # the walls as known as their rough echo tells [m]
+    bound_with_walls: float | None  # the walls as their rough echo tells, which bend pilots [m]
     wall_angle: float | None  # error of the wall that is nearest to the truth's [rad]
     wall_offset: float | None  # likewise [m]
 
@@ -312,7 +313,7 @@ def _compared(
 
 
 def _bounds(scenario: Scenario, user: str) -> tuple[float | None, float | None]:
-    """Return the position error bound with known walls, and with those that their echo tells."""
+    """Return the position error bound with known walls, and with rough ones that are found."""
     try:
         known = scenario_position_bound(scenario, user).deviation
     except ValueError:  # no noise, or nothing that fixes the position
@@ -325,6 +326,18 @@ def _bounds(scenario: Scenario, user: str) -> tuple[float | None, float | None]:
             except ValueError:  # smooth, or in space: its echo has no such closed form
                 return known, None
     try:
-        return known, scenario_position_bound(scenario, user, wall_covariance=covariance).deviation
-    except ValueError:  # a wall that no path meets
+        told = scenario_position_bound(scenario, user, wall_covariance=covariance).deviation
+        return known, float(np.hypot(told, _bent(scenario, user)))
+    except ValueError:  # a wall that no path meets, or a scene in space
         return known, None
+
+
+def _bent(scenario: Scenario, user: str) -> float:
+    """Return what a wall's heights do to the pilot itself, if it comes over that one alone [m].
+
+    Beside a direct path, or over several walls, there is no closed form; then it is 0.
+    """
+    heard = user_waves(scenario, user)
+    if len(heard.paths) != 1 or len(heard.paths[0]) != 1:
+        return 0.0
+    return roughness_floor(scenario, user, heard.owners[heard.paths[0][0]]).deviation

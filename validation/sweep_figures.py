@@ -100,7 +100,7 @@ _KEY = {
     "90 %": Line2D([], [], color="0.3", lw=1, marker="^", ms=4),
     "worst": Line2D([], [], color="0.3", lw=1, ls=":", marker="x", ms=4),
     "bound, wall known": Line2D([], [], color="0.3", lw=1.2, ls="--"),
-    "bound, wall from its rough echo": Line2D([], [], color="0.3", lw=1.2, ls="-."),
+    "bound, rough wall found by echo": Line2D([], [], color="0.3", lw=1.2, ls="-."),
 }
 
 

@@ -25,7 +25,7 @@ _MEANINGS = {
     "error": "distance of the estimate from the true position",
     "deviation": "the standard deviation that the estimate claims",
     "bound": "position error bound, the walls known",
-    "bound_with_walls": "position error bound, the walls as known as their rough echo tells",
+    "bound_with_walls": "the same; walls as their rough echo tells, which bend the pilot",
     "wall_angle": "angle between the estimated and the true wall",
     "wall_offset": "of the true wall's centre from the estimated one",
 }
