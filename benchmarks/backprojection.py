@@ -170,6 +170,7 @@ def slopes() -> None:
             echo = echo_of_targets(sizes["positions"], sizes["freqs"])
             axis = np.linspace(-0.25, 0.25, sizes["pixels"])
             points = PixelGrid.plane(x=axis, y=axis + 0.65).points
+            # mypy infers no type for a lambda with defaults.
             row.append(fastest({"": lambda e=echo, p=points: backproject(e, p)}, repeats=5)[""])  # type: ignore[misc]
         slope = np.polyfit(np.log([1, 2, 4]), np.log(row), 1)[0]
         print(f"  {size:10s}" + "".join(f"{t:9.4f}" for t in row) + f"   slope {slope:.2f}")

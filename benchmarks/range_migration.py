@@ -27,8 +27,8 @@ def linear() -> None:
     sizes: list[tuple[tuple[int, ...], tuple[int, ...], int]] = []
     ffts = {name: getattr(scipy.fft, name) for name in ("fft", "ifft")}
 
-    def recorded(name: str):  # type: ignore[no-untyped-def]
-        def call(x, n=None, axis=-1, **options):  # type: ignore[no-untyped-def]
+    def recorded(name: str):  # type: ignore[no-untyped-def]  # takes any function of SciPy's
+        def call(x, n=None, axis=-1, **options):  # type: ignore[no-untyped-def]  # like it
             result = ffts[name](x, n=n, axis=axis, **options)
             sizes.append((x.shape, result.shape, axis))
             return result

@@ -16,7 +16,7 @@ is. What one cell's speckle pushes off the line, its neighbours' parts take back
 mixes the wavenumbers where the weight changes, and :math:`1 - u^2` makes that least for a tilt
 (it minimises :math:`\int |(wu)'|^2 / (\int w u^2)^2`). A power between magnitude and intensity
 bears walls whose own heights are what pushes. Over 124 realisations of six walls the tilt's
-error fell to 0.4 to 0.7 of that of J's summit (rms heights up to 0.05 mm), and rose to 1.2 on one
+error fell to 0.4 to 0.8 of that of J's summit (rms heights up to 0.05 mm), and rose to 1.2 on one
 of 0.1 mm.
 
 The summit is that of a paraboloid fitted over most of a cell. The covariance comes from how

@@ -38,7 +38,7 @@ LABELS = ("user_position", "line_of_sight", "wall_start", "wall_end", "path_angl
 """What of the group ``truth`` is learnt from; there is more."""
 
 
-class Samples(Base):  # type: ignore[misc]
+class Samples(Base):  # type: ignore[misc]  # PyTorch is not installed here
     """The samples of a dataset that could be made, in order."""
 
     def __init__(self, path: str | Path) -> None:

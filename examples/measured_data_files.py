@@ -10,7 +10,7 @@ import csv
 import sys
 from pathlib import Path
 
-import h5py  # type: ignore[import-untyped]
+import h5py  # type: ignore[import-untyped]  # it has no stubs
 import numpy as np
 import scipy.io
 from scipy.constants import speed_of_light

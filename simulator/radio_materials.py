@@ -159,7 +159,7 @@ def radio_material(
     return made
 
 
-class _FollowingMaterial(rt.RadioMaterial):  # type: ignore[misc]
+class _FollowingMaterial(rt.RadioMaterial):  # type: ignore[misc]  # Sionna RT is untyped
     """A radio material all of whose parameters follow the frequency.
 
     Sionna's callback reaches permittivity and conductivity only; and a callback that holds the
