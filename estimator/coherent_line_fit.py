@@ -29,7 +29,8 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
 
-from estimator.measurement import Echo
+from estimator.measurement import Echo, frequency_step
+from estimator.mirror_fit import across
 
 OVERSAMPLING = 1.2
 """Scatterers of the row, over those that hold all of the speckle that the echo can show. Fewer
@@ -86,7 +87,7 @@ def fit_coherently(
     Parameters
     ----------
     echo
-        In the array's frame; monostatic, of uniform frequencies.
+        In the array's frame, of uniform frequencies; transmitters may stand apart.
     start, end
         The line. [m]
     cell_along, cell_across
@@ -104,10 +105,10 @@ def fit_coherently(
     of a row of scatterers nearby.
     """
     length = float(np.linalg.norm(end - start))
-    low, high = (-0.5 * length - beyond[0], 0.5 * length + beyond[1])
-    count = int(np.ceil(OVERSAMPLING * (high - low) * _bandwidth_along(echo, start, end)))
     if length < FEWEST_CELLS * cell_along:
         return None
+    low, high = (-0.5 * length - beyond[0], 0.5 * length + beyond[1])
+    count = int(np.ceil(OVERSAMPLING * (high - low) * _bandwidth_along(echo, start, end)))
     places = low + (np.arange(count) + 0.5) / count * (high - low)
     levers = 2 * places / length
     thinned = _thinned(echo, start, end)
@@ -119,9 +120,7 @@ def fit_coherently(
         along = (end - start) / length
         row = 0.5 * (start + end) + places[:, None] * along
         echoes, by_range = _echoes(thinned, profiles, row)
-        ways = row[None] - thinned.positions[:, None]
-        # Of the range, over that of the line along its normal.
-        closing = ways @ _across(start, end) / np.linalg.norm(ways, axis=-1)
+        closing = _range_slopes(thinned, row, across(start, end))
         slopes = by_range * np.repeat(closing, len(profiles.ranges), axis=0)
         if beside is not None:
             echoes = np.concatenate([echoes, beside], axis=1)
@@ -175,16 +174,11 @@ class _Profiles:
     ranges: Float[np.ndarray, " bins"]  # [m]
 
 
-def _across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> np.ndarray:
-    along = (end - start) / np.linalg.norm(end - start)
-    return np.array([along[1], -along[0], 0.0])
-
-
 def _moved(
     start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], step: Float[np.ndarray, " 2"]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
     """Displace a line along its normal, and its ends by so much more and less."""
-    normal = _across(start, end)
+    normal = across(start, end)
     return start + (step[0] - step[1]) * normal, end + (step[0] + step[1]) * normal
 
 
@@ -196,10 +190,9 @@ def _bandwidth_along(
     A place's echo goes through 2f/c times the cosine between its ray and the wall.
     """
     along = (end - start) / np.linalg.norm(end - start)
-    ways = np.linspace(start, end, 9)[:, None] - echo.positions[None]
-    cosines = ways @ along / np.linalg.norm(ways, axis=-1)
+    cosines = _range_slopes(echo, np.linspace(start, end, 9), along)
     edges = 2 / speed_of_light * echo.frequencies[[0, -1], None, None] * cosines
-    return float(np.max(edges.max(axis=(0, 2)) - edges.min(axis=(0, 2))))
+    return float(np.max(edges.max(axis=(0, 1)) - edges.min(axis=(0, 1))))
 
 
 def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Echo:
@@ -224,13 +217,41 @@ def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, 
         samples=echo.samples[::every],
         positions=echo.positions[::every],
         frequencies=echo.frequencies,
+        transmit_positions=None
+        if echo.transmit_positions is None
+        else echo.transmit_positions[::every],
     )
+
+
+def _ways(
+    echo: Echo, points: Float[np.ndarray, "points 3"]
+) -> list[Float[np.ndarray, "positions points 3"]]:
+    """Return the ways from receivers and from transmitters to points. [m]."""
+    ends = [echo.positions]
+    ends.append(ends[0] if echo.transmit_positions is None else echo.transmit_positions)
+    return [points[None] - end[:, None] for end in ends]
+
+
+def _ranges(
+    echo: Echo, points: Float[np.ndarray, "points 3"]
+) -> Float[np.ndarray, "positions points"]:
+    """Return half the way out and back. [m]."""
+    back, out = (np.linalg.norm(way, axis=-1) for way in _ways(echo, points))
+    return np.asarray(0.5 * (back + out))
+
+
+def _range_slopes(
+    echo: Echo, points: Float[np.ndarray, "points 3"], direction: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "positions points"]:
+    """Return by how much these ranges grow as points move in a direction. [-]."""
+    back, out = (way @ direction / np.linalg.norm(way, axis=-1) for way in _ways(echo, points))
+    return np.asarray(0.5 * (back + out))
 
 
 def _sweep(echo: Echo) -> tuple[float, float, int]:
     """Return the band's centre, its step, and the number of frequencies."""
     count = len(echo.frequencies)
-    step = float(echo.frequencies[-1] - echo.frequencies[0]) / (count - 1)
+    step = frequency_step(echo.frequencies)
     return float(echo.frequencies[0]) + 0.5 * (count - 1) * step, step, count
 
 
@@ -240,8 +261,7 @@ def _profiles(
     """Range profiles around the wall, at the sweep's own independent ranges."""
     centre, step, count = _sweep(echo)
     bin_width = speed_of_light / (2 * count * step)
-    points = np.linspace(start, end, 33)
-    ranges = np.linalg.norm(points[:, None] - echo.positions[None], axis=-1)
+    ranges = _ranges(echo, np.linspace(start, end, 33))
     low = int(np.floor(ranges.min() / bin_width)) - RANGE_MARGIN
     high = int(np.ceil(ranges.max() / bin_width)) + RANGE_MARGIN
     bins = np.arange(low, min(high, low + count - 1) + 1) * bin_width
@@ -255,7 +275,7 @@ def _echoes(
 ) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
     """Return each scatterer's range profiles, and their slopes over its range [1/m]."""
     centre, step, count = _sweep(echo)
-    ranges = np.linalg.norm(points[None] - echo.positions[:, None], axis=-1)
+    ranges = _ranges(echo, points)
     # Dirichlet's kernel about the band's centre is real: the sum over the sweep's frequencies,
     # sin(Nx)/sin(x). Bins are π/N apart in x, so that N times as much needs no sine of each bin.
     per_range = 2 * np.pi * step / speed_of_light

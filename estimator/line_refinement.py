@@ -10,7 +10,7 @@ from estimator.backprojection import prepare
 from estimator.coherent_line_fit import fit_coherently
 from estimator.line_search import Resolution
 from estimator.measurement import Echo
-from estimator.mirror_fit import FittedLine, Focus
+from estimator.mirror_fit import FittedLine, Focus, across
 from estimator.mirrors import (
     Survey,
     coarse_resolution,
@@ -75,12 +75,12 @@ def _bright_beside(
     beside = beside[brightest]
     distance = np.linalg.norm(beside, axis=-1, keepdims=True)
     ray = beside / distance
-    across = np.stack([ray[:, 1], -ray[:, 0], ray[:, 2]], axis=-1) * distance * coarse.across_ray
+    sideways = np.stack([ray[:, 1], -ray[:, 0], ray[:, 2]], axis=-1) * distance * coarse.across_ray
     steps = np.array([-0.5, 0.0, 0.5])
     grid = (
         beside[:, None, None]
         + steps[:, None, None] * coarse.along_ray * ray[:, None, None]
-        + steps[:, None] * across[:, None, None]
+        + steps[:, None] * sideways[:, None, None]
     )
     return grid.reshape(-1, 9, 3), intensity[brightest]
 
@@ -95,13 +95,12 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
         else LINE_MARGIN * along
         for tip in (line.start, line.end)
     ]
-    normal = np.array([line.direction[1], -line.direction[0], 0.0])
     found = fit_coherently(
         echo,
         line.start,
         line.end,
         cell_along=along,
-        cell_across=float(resolution.cell(line.middle, normal)),
+        cell_across=float(resolution.cell(line.middle, across(line.start, line.end))),
         beyond=(beyond[0], beyond[1]),
         others=others.reshape(-1, 3),
     )

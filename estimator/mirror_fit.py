@@ -178,7 +178,8 @@ def fit_between(
     )
 
 
-def _across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> np.ndarray:
+def across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+    """Return a line's unit normal: its direction turned by -90 degrees in the array's plane."""
     along = (end - start) / np.linalg.norm(end - start)
     return np.array([along[1], -along[0], 0.0])
 
@@ -193,7 +194,7 @@ def _cell_along(
 def _cell_across(
     start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
 ) -> float:
-    return float(resolution.cell(0.5 * (start + end), _across(start, end)))
+    return float(resolution.cell(0.5 * (start + end), across(start, end)))
 
 
 def _places(
@@ -220,7 +221,7 @@ def _trial_points(
 ) -> Float[np.ndarray, "tilts offsets places 3"]:
     """Points of lines turned about the midpoint (counter-clockwise) and moved along the normal."""
     along = (end - start) / np.linalg.norm(end - start)
-    normal = _across(start, end)
+    normal = across(start, end)
     # The normal is the tangent turned by −90°, so a turn by δ moves the tangent by −δ·normal.
     tangents = np.cos(tilts)[:, None] * along - np.sin(tilts)[:, None] * normal
     normals = np.cos(tilts)[:, None] * normal + np.sin(tilts)[:, None] * along
