@@ -73,13 +73,25 @@ def significant_peaks(
     Where the peaks are [m]; the background is taken to be exponentially distributed, with
     the image's median.
     """
-    background = float(np.median(intensity)) / np.log(2)
+    background = mean_background(intensity)
     threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
     rows, columns = np.nonzero(
         (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
     )
     order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
     return points[rows[order], columns[order]]
+
+
+def mean_background(intensity: Float[np.ndarray, "*n"]) -> float:
+    """Return the mean of an exponentially distributed background with this median."""
+    return float(np.median(intensity)) / float(np.log(2))
+
+
+def image_contrast(brightest: float, background: float) -> float:
+    """Return the intensity of an image's brightest point over its background; 0 of no image."""
+    if brightest == 0:
+        return 0.0
+    return brightest / background if background > 0 else np.inf
 
 
 def find_lines(

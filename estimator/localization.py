@@ -102,6 +102,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             clock_known=clock_known,
             reach=echo_reach(local_echo)[1] if local_echo else np.inf,
             widest=imaged_sine(local_echo) if local_echo else 1.0,
+            contrast=room.survey.contrast if room else 0.0,
         )
         if room and clock_known:
             found = with_diffuse_search(found, local, room.lines, room.walls, room.seen_through)

@@ -101,6 +101,7 @@ def locate_in_space(measurement: Measurement, *, progress: Progress | None = Non
             room.walls if room is not None else (),
             cell=cell,
             imaged=room is not None,
+            contrast=room.survey.contrast if room is not None else 0.0,
         )
         users.append(_in_world(found, frame))
         timings[f"user {uplink.user}"] = time.perf_counter() - started

@@ -8,7 +8,14 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import Focuser, backproject, focus, prepare
-from estimator.line_search import LineCandidate, Resolution, find_lines, significant_peaks
+from estimator.line_search import (
+    LineCandidate,
+    Resolution,
+    find_lines,
+    image_contrast,
+    mean_background,
+    significant_peaks,
+)
 from estimator.measurement import Echo, MeasurementError, frequency_step
 from estimator.mirror_fit import FittedLine, Focus, fit_between, fit_line
 from estimator.projection import crossing
@@ -59,6 +66,12 @@ class Survey:
     bent: Bool[np.ndarray, " peaks"]  # whether they were scattered twice: seen nowhere
     as_point: Float[np.ndarray, " peaks"]  # coherence over the aperture, as that of a point [-]
     as_mirror: Float[np.ndarray, " peaks"]  # the same as that of a mirror facing the array [-]
+
+    @property
+    def contrast(self) -> float:
+        """Intensity of the brightest over the mean of what is no echo; 0 of no echo. [-]."""
+        intensity = np.abs(self.values) ** 2
+        return image_contrast(float(intensity.max()), mean_background(intensity))
 
 
 def echo_resolution(echo: Echo) -> Resolution:
@@ -119,7 +132,7 @@ def survey(echo: Echo) -> Survey:
     peaks = significant_peaks(np.abs(values) ** 2, points)
     tried = bent_intensities(range_profiles(echo), peaks, resolution)
     # What the noise in the image is before the sum over the positions.
-    noise = float(np.median(np.abs(values) ** 2)) / np.log(2) * taper.sum() ** 2 / (taper**2).sum()
+    noise = mean_background(np.abs(values) ** 2) * taper.sum() ** 2 / (taper**2).sum()
     across = frequency_taper(echo.frequencies, SURVEY_TAPER)
     profiles = range_profiles(echo, weights=across[None, :])
     by_shape = [

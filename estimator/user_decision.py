@@ -8,7 +8,7 @@ consistent one explains nearly as much elsewhere.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -19,7 +19,8 @@ from estimator.estimate import PathReport, UserEstimate
 from estimator.path_consensus import Consensus, Sighting, block_covariance, solve_position
 from estimator.paths import Path, PathSet
 from estimator.projection import Wall, mirrored, project
-from estimator.straight_way import unseen_mirror, what_stands_in_the_way
+from estimator.straight_way import doubt_straight_way
+from estimator.surroundings import Surroundings
 
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
@@ -30,19 +31,6 @@ SAME = float(chi2.ppf(0.999, df=2))
 SHARP = 10.0
 """A position known this many times better than the distance of its alternative cannot have
 been hit by chance: two paths agree there. [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Surroundings:
-    """What is known of the room, in the array's frame."""
-
-    walls: tuple[Wall, ...]  # mirrors at their true place
-    wall_covariance: Float[np.ndarray, "parameters parameters"]  # of all walls' (angle, offset)
-    cell: float  # how well the image tells where a wall ends, as an angle [rad]
-    imaged: bool  # whether there was an echo: without, nothing is known of mirrors
-    loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
-    reach: float  # how far the image shows what there is [m]
-    widest: float  # sine of the angle from boresight to which it does [-]
 
 
 def decide(
@@ -57,6 +45,7 @@ def decide(
     clock_known: bool = True,
     reach: float = np.inf,
     widest: float = 1.0,
+    contrast: float = np.inf,
 ) -> UserEstimate:
     """Locate a user in the array's frame.
 
@@ -82,12 +71,15 @@ def decide(
         How far the image shows what there is. [m]
     widest
         Sine of the angle from boresight to which it does. [-]
+    contrast
+        Intensity of the brightest in the image over its background. [-]
 
     Returns
     -------
     ``found`` with the position that the paths agree on; ``ambiguous`` if strong paths
-    contradict each other, the reflection is at a wall's very end, a wall that is too smooth to
-    be seen may be in the way, or one path alone has no known clock, with the alternatives;
+    contradict each other, the reflection is at a wall's very end, a wall that is too smooth or
+    an echo too noisy to be seen may be in the way, or one path alone has no known clock, with the
+    alternatives;
     ``not_found`` with the reason.
     """
     if not found.paths:
@@ -100,6 +92,7 @@ def decide(
         loose=loose,
         reach=reach,
         widest=widest,
+        contrast=contrast,
     )
     answer = (_on_our_clock if clock_known else _on_any_clock)(name, found, room)
     if answer.status == "found" and not imaged:
@@ -143,7 +136,8 @@ def _on_our_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate
         )
     if len(best.sightings) > 1:
         return answer
-    return _if_nothing_stands_in_the_way(answer, found, best, room)
+    (only,) = best.sightings
+    return answer if only.chain else doubt_straight_way(answer, found.paths[only.path].wave, room)
 
 
 def _on_any_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate:
@@ -383,57 +377,3 @@ def _ambiguous(
         alternatives=others,
         line_of_sight=seen.pop() if len(seen) == 1 else None,
     )
-
-
-def _if_nothing_stands_in_the_way(
-    answer: UserEstimate, found: PathSet, best: Consensus, room: Surroundings
-) -> UserEstimate:
-    """Doubt a straight way on which the image shows something that is no wall it knows."""
-    (only,) = best.sightings
-    if only.chain:
-        return answer
-    wave = found.paths[only.path].wave
-    mirror = unseen_mirror(wave.aoa, wave.path_length, room.loose)
-    if mirror is not None:
-        place = project(wave.aoa, wave.path_length, [mirror], covariance=wave.covariance)
-        other = replace(
-            answer,
-            position=place.position,
-            covariance=place.covariance,
-            bounces=1,
-            path=place.path,
-            line_of_sight=False,
-        )
-        return _ambiguous(
-            answer,
-            "the straight way passes between two points that may be the ends of a wall too smooth "
-            "to be seen; over such a wall the user is elsewhere",
-            [other],
-        )
-    thing = what_stands_in_the_way(wave.aoa, wave.path_length, room.loose, room.cell)
-    if thing is not None:
-        return replace(
-            answer,
-            status="ambiguous",
-            line_of_sight=None,
-            reason=f"something stands on the straight way at ({thing[0]:.3f}, {thing[1]:.3f}) m: "
-            "if it is a mirror too short to be told as one, the user is elsewhere",
-        )
-    if wave.path_length > room.reach:
-        return replace(
-            answer,
-            status="ambiguous",
-            line_of_sight=None,
-            reason=f"the straight way is {wave.path_length:.2f} m long, and the image shows what "
-            f"stands on it to {room.reach:.2f} m only; take smaller frequency steps",
-        )
-    if abs(np.cos(wave.aoa)) > room.widest:
-        return replace(
-            answer,
-            status="ambiguous",
-            line_of_sight=None,
-            reason=f"the image does not show what stands on the straight way at "
-            f"{np.degrees(wave.aoa):.1f}°, but only what is within "
-            f"{np.degrees(np.arcsin(room.widest)):.1f}° of boresight",
-        )
-    return answer

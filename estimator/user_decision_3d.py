@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from estimator.estimate import UserEstimate
 from estimator.paths_3d import SpacePath
 from estimator.projection_3d import PlaneWall, SpaceProjection, project_in_space
+from estimator.straight_way import hides_walls, too_noisy
 
 AGREE = float(chi2.ppf(0.999, df=3))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
@@ -32,6 +33,7 @@ def decide_in_space(
     *,
     cell: float,
     imaged: bool,
+    contrast: float = np.inf,
 ) -> UserEstimate:
     """Locate a user in a planar array's frame.
 
@@ -47,12 +49,15 @@ def decide_in_space(
         How well the image tells where a wall ends, as an angle. [rad]
     imaged
         Whether there was an echo at all: without, nothing is known of mirrors.
+    contrast
+        Intensity of the brightest in the image over its background. [-]
 
     Returns
     -------
     ``found`` with the position that the paths agree on; ``ambiguous`` if a strong path that is
     no longer contradicts it (a longer one may always come over a wall that is not seen), or a
-    wall ends where the path meets it, with the alternatives; ``not_found`` with the reason.
+    wall ends where the path meets it, with the alternatives, or if the echo is too noisy to show
+    walls; ``not_found`` with the reason.
     """
     if not paths:
         return UserEstimate(name=name, status="not_found", reason="no wave stands out of the pilot")
@@ -86,6 +91,9 @@ def decide_in_space(
     if not imaged:
         reason = "no echo was measured, so mirrors are unknown; this is the place without any"
         return replace(answer, status="ambiguous", reason=reason)
+    if not walls and hides_walls(contrast):
+        reason = too_noisy(contrast)
+        return replace(answer, status="ambiguous", reason=reason, line_of_sight=None)
     return answer
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import backproject
-from estimator.line_search import DYNAMIC_RANGE, FALSE_ALARM
+from estimator.line_search import DYNAMIC_RANGE, FALSE_ALARM, image_contrast, mean_background
 from estimator.measurement import Echo
 from estimator.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.windows import survey_weights
@@ -49,6 +49,11 @@ class VolumeSurvey:
     background: float  # mean intensity of what is no echo [-]
     peaks: Float[np.ndarray, "peaks 3"]  # that stand out of it, strongest first [m]
     lobes: Float[np.ndarray, "lobes 3"]  # peaks that are grating lobes of what is outside [m]
+
+    @property
+    def contrast(self) -> float:
+        """Intensity of the brightest over the background; 0 of no echo. [-]."""
+        return image_contrast(float(np.max(np.abs(self.values) ** 2)), self.background)
 
     def at(self, points: Float[np.ndarray, "*n 3"]) -> Complex[np.ndarray, "*n"]:
         """Read the image at points; outside the surveyed volume there is none: 0."""
@@ -107,7 +112,7 @@ def survey_volume(echo: Echo, array: PlanarArray) -> VolumeSurvey:
     carrier = 4 * np.pi * float(echo.frequencies.mean()) / speed_of_light
     values *= np.exp(-1j * carrier * ranges)[:, None, None]
     intensity = np.abs(values) ** 2
-    background = float(np.median(intensity[seen])) / float(np.log(2))
+    background = mean_background(intensity[seen])
     threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
     tops = (intensity == scipy.ndimage.maximum_filter(intensity, size=3)) & (intensity > threshold)
     order = np.argsort(-intensity[tops], kind="stable")[:MOST_PEAKS]

@@ -378,6 +378,18 @@ def test_noise_alone_is_no_user_and_no_wall(room: Room) -> None:
     assert only(estimate).status == "not_found"
 
 
+def test_an_echo_of_noise_alone_says_no_more_than_none(room: Room) -> None:
+    rng = np.random.default_rng(5)
+    parts = rng.standard_normal((2, *room.echo.samples.shape))
+    silent = replace(room.echo, samples=parts[0] + 1j * parts[1])
+    near = np.array([0.05, 0.3, 0.0])
+    user = only(locate(room.measured(room.pilot(near), echo=silent)))
+    assert (user.status, user.line_of_sight) == ("ambiguous", None)
+    assert error_of(user, near) <= 1e-4
+    assert user.reason is not None
+    assert "above its noise" in user.reason
+
+
 def test_without_an_echo_the_place_is_only_a_guess(room: Room) -> None:
     estimate = locate(room.measured(room.pilot(USER), echo=None))
     user = only(estimate)

@@ -117,13 +117,17 @@ def test_the_volume_shows_the_post_where_it_is(estimate: Estimate) -> None:
     assert np.linalg.norm(place - POST) < 0.5 * np.hypot(0.021, 0.6 * 0.033)
 
 
-def test_noise_alone_makes_no_wall_and_no_target() -> None:
+def test_noise_alone_makes_no_wall_no_target_and_no_certain_user(measurement: Measurement) -> None:
     rng = np.random.default_rng(2)
     samples = complex_noise((len(elements()), BAND.size), 1e-6, rng)
     echo = Echo(samples=samples, positions=elements(), frequencies=BAND)
-    found = locate(Measurement(echo=echo, uplinks=(), clock_offset=0.0))
+    found = locate(Measurement(echo=echo, uplinks=measurement.uplinks[:1], clock_offset=0.0))
     assert found.mirrors == ()
     assert found.targets == ()
+    (user,) = found.users
+    assert user.status == "ambiguous"
+    assert user.reason is not None
+    assert "above its noise" in user.reason
 
 
 def test_turning_the_whole_world_turns_the_answer(measurement: Measurement) -> None:

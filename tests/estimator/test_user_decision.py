@@ -186,6 +186,31 @@ def test_something_on_the_straight_way_may_be_a_short_mirror() -> None:
         assert decided([direct(user)], [], loose=np.array([place])).status == "found"
 
 
+@pytest.mark.parametrize(
+    ("contrast", "walls", "status"),
+    [(50.0, [], "ambiguous"), (1e4, [], "found"), (50.0, [SLANTED], "found")],
+)
+def test_an_echo_too_noisy_to_show_walls_leaves_the_straight_way_open(
+    contrast: float, walls: list[Wall], status: str
+) -> None:
+    user = np.array([0.5, 0.3, 0.0])  # not over the wall that is known in the last case
+    answer = decide(
+        "ann",
+        together([direct(user)]),
+        walls,
+        cell=CELL,
+        imaged=True,
+        loose=NOTHING_LOOSE,
+        contrast=contrast,
+    )
+    assert answer.status == status
+    assert answer.position == pytest.approx(user, abs=1e-9)
+    if status == "ambiguous":
+        assert answer.line_of_sight is None
+        assert answer.reason is not None
+        assert "is 17 dB above its noise, and below 25 dB walls may not show" in answer.reason
+
+
 def late(paths: list[Path], walls: list[Wall]) -> UserEstimate:
     return decide(
         "ann", together(paths), walls, cell=CELL, imaged=True, loose=NOTHING_LOOSE,
