@@ -297,7 +297,7 @@ def _compared(
     walls = [error for error in wall_errors(estimate.mirrors, truth) if error is not None]
     # The wall that was found is the mirror that covers most of one.
     best = max(walls, key=lambda error: error.covered, default=None)
-    known, told = _bounds(scenario, user.name)
+    known, told = position_bounds(scenario, user.name)
     covariance = user.covariance
     return {
         "user": user.name,
@@ -312,8 +312,21 @@ def _compared(
     }
 
 
-def _bounds(scenario: Scenario, user: str) -> tuple[float | None, float | None]:
-    """Return the position error bound with known walls, and with rough ones that are found."""
+def position_bounds(scenario: Scenario, user: str) -> tuple[float | None, float | None]:
+    """Return the position error bound with known walls, and with rough ones that are found.
+
+    Parameters
+    ----------
+    scenario
+        The point's.
+    user
+        Its name.
+
+    Returns
+    -------
+    Deviations, None where there is no closed form. The second knows each wall as its rough echo
+    tells, and counts what that wall's heights do to the pilot. [m]
+    """
     try:
         known = scenario_position_bound(scenario, user).deviation
     except ValueError:  # no noise, or nothing that fixes the position

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import distributed
 import pytest
 
 from simulator import resumable_work
@@ -22,6 +23,11 @@ def die_once(mark: Path) -> str:
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return "alive"
+
+
+def die() -> None:
+    """Kill the own process each time, as a sample that never fits into memory does."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def threads() -> int:
@@ -66,6 +72,49 @@ def test_every_task_is_done_once_and_failures_are_told(processes: int, tmp_path:
     assert most_ahead <= 2 * max(processes, 1)  # never all tasks at once
     if processes:
         assert found["more"] == 1  # each worker computes in one thread
+
+
+def test_a_task_that_kills_each_worker_fails_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resumable_work, "DEATHS", 1)
+    found: dict[str, Result] = {}
+
+    def on_result(task: Task, result: Result) -> Iterable[Task]:
+        found[task.name] = result
+        return []
+
+    tasks = [
+        Task(name="die-0", function=die),
+        *(Task(name=f"square-{i}", function=square, arguments=(i,)) for i in (1, 2)),
+    ]
+    work_off(tasks, workers=Workers(processes=1), on_result=on_result)
+    assert type(found["die-0"]).__name__ == "KilledWorker"
+    assert (found["square-1"], found["square-2"]) == (1, 4)
+
+
+def test_a_scheduler_of_somebody_else_does_the_work() -> None:
+    found: dict[str, Result] = {}
+
+    def on_result(task: Task, result: Result) -> Iterable[Task]:
+        found[task.name] = result
+        return [Task(name="threads", function=threads)] if task.name == "square-4" else []
+
+    tasks = (Task(name=f"square-{i}", function=square, arguments=(i,)) for i in range(20))
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=2,
+        dashboard_address=None,
+        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+    ) as cluster:
+        work_off(tasks, workers=Workers(scheduler=cluster.scheduler_address), on_result=on_result)
+        # It is not ours to end: the next run finds it there.
+        work_off(
+            [Task(name="again", function=square, arguments=(9,))],
+            workers=Workers(scheduler=cluster.scheduler_address),
+            on_result=on_result,
+        )
+    assert isinstance(found.pop("square-3"), ZeroDivisionError)
+    assert (found.pop("threads"), found.pop("again")) == (1, 81)
+    assert found == {f"square-{i}": i**2 for i in range(20) if i != 3}
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -142,6 +142,51 @@ def test_a_point_that_fails_is_told_and_tried_again(
     assert run_sweep(job, workers=HERE) == ran[1]
 
 
+SECOND = (
+    "objects.second.kind=plate",
+    "objects.second.material=metal",
+    "objects.second.centre_m=[0.6, 0.4]",
+    "objects.second.angle_deg=-45.0",
+    "objects.second.length_m=0.25",
+)
+"""A second wall, on which no first reflection falls."""
+
+
+def told_bound(*overrides: str, rms_mm: float = 0.05, snr_db: float = 60.0) -> tuple[float, float]:
+    """Return the bounds of a user over one wall: the wall known, and as its echo tells."""
+    small = ("base_station.elements=64", "radio.points=101", "radio.stop_ghz=250.0")
+    room = ("objects.wall.centre_m=[0.0, 0.4]", "objects.wall.length_m=0.25")
+    asked = (f"objects.wall.roughness.rms_mm={rms_mm}", f"noise.snr_db={snr_db}")
+    user = "users.user.position_m=[0.4, 0.4]"
+    scenario = load_scenario("slam_2d", [*small, *room, *asked, user, *overrides])
+    known, told = sweep.position_bounds(scenario, "user")
+    assert known is not None
+    assert told is not None
+    return known, told
+
+
+def test_more_power_does_not_lower_the_bound_below_the_roughness_of_the_wall() -> None:
+    known, told = told_bound()
+    better_known, better_told = told_bound(snr_db=80.0)
+    assert better_known == pytest.approx(0.1 * known, rel=1e-6)  # 20 dB are ten times
+    # At 60 dB noise has no part left in what the wall's heights do.
+    assert better_told == pytest.approx(told, rel=1e-3)
+    assert told > 10 * known
+    # Heights act in first order. The wall's own place gets no better as it gets smoother, for its
+    # speckle stays what it is: the sum lies between a constant and that order.
+    smoother = told_bound(rms_mm=0.025)[1]
+    assert 0.5 * told < smoother < told
+
+
+def test_only_the_wall_that_the_pilot_comes_over_bends_it() -> None:
+    told = told_bound()[1]
+    rough = (*SECOND, "objects.second.roughness.rms_mm=0.2", "max_bounces=1")
+    rough += ("objects.second.roughness.correlation_mm=0.3",)
+    assert told_bound(*rough)[1] == pytest.approx(told, rel=1e-3)
+    smooth_second = load_scenario("slam_2d", [*SECOND, "noise.snr_db=20.0"])
+    assert sweep.position_bounds(smooth_second, "user")[1] is None  # no echo tells where it is
+
+
 def test_tables_hold_every_outcome(ran: tuple[sweep.SweepJob, tuple[Outcome, ...]]) -> None:
     job, outcomes = ran
     rows = list(csv.DictReader(io.StringIO(error_table(outcomes, job.space))))
