@@ -1,10 +1,11 @@
+import importlib
 import os
 import signal
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
-import distributed
 import pytest
 
 from simulator import resumable_work
@@ -99,6 +100,7 @@ def test_a_scheduler_of_somebody_else_does_the_work() -> None:
         return [Task(name="threads", function=threads)] if task.name == "square-4" else []
 
     tasks = (Task(name=f"square-{i}", function=square, arguments=(i,)) for i in range(20))
+    distributed: Any = importlib.import_module("distributed")  # half its annotations are missing
     with distributed.LocalCluster(
         n_workers=1,
         threads_per_worker=2,

@@ -180,8 +180,12 @@ def test_more_power_does_not_lower_the_bound_below_the_roughness_of_the_wall() -
 
 def test_only_the_wall_that_the_pilot_comes_over_bends_it() -> None:
     told = told_bound()[1]
-    rough = (*SECOND, "objects.second.roughness.rms_mm=0.2", "max_bounces=1")
-    rough += ("objects.second.roughness.correlation_mm=0.3",)
+    rough = (
+        *SECOND,
+        "objects.second.roughness.rms_mm=0.2",
+        "objects.second.roughness.correlation_mm=0.3",
+        "max_bounces=1",
+    )
     assert told_bound(*rough)[1] == pytest.approx(told, rel=1e-3)
     smooth_second = load_scenario("slam_2d", [*SECOND, "noise.snr_db=20.0"])
     assert sweep.position_bounds(smooth_second, "user")[1] is None  # no echo tells where it is
