@@ -8,16 +8,15 @@ from jaxtyping import Float
 
 from estimator.backprojection import prepare
 from estimator.coherent_line_fit import fit_coherently
-from estimator.line_search import Resolution
+from estimator.line_relations import lies_on
+from estimator.line_search import Resolution, coarse_resolution
 from estimator.measurement import Echo
 from estimator.mirror_fit import FittedLine, Focus, across
 from estimator.mirrors import (
     Survey,
-    coarse_resolution,
     echo_reach,
     echo_resolution,
     focus_within,
-    lies_on,
 )
 from estimator.range_profiles import range_profiles
 from estimator.windows import survey_weights

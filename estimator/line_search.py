@@ -11,6 +11,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter
 
+from estimator.resolution import HALF_POWER
+from estimator.windows import SURVEY_TAPER
+
 FALSE_ALARM = 1e-6
 """Probability that a pixel of pure background counts as significant. [-]."""
 
@@ -45,6 +48,12 @@ class Resolution:
         crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
         width = 1 / np.hypot(radial / self.along_ray, crossing / (self.across_ray * reach))
         return np.asarray(width)
+
+
+def coarse_resolution(fine: Resolution) -> Resolution:
+    """Return the resolution of the survey, which its taper widens."""
+    wider = SURVEY_TAPER.half_power_width / HALF_POWER
+    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,18 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.backprojection import Focuser, backproject, focus, prepare
+from estimator.face_ends import face_ends
+from estimator.line_relations import (
+    hides,
+    is_edge_on,
+    is_hidden,
+    lies_on,
+    overlap,
+)
 from estimator.line_search import (
     LineCandidate,
     Resolution,
+    coarse_resolution,
     find_lines,
     image_contrast,
     mean_background,
@@ -20,7 +29,7 @@ from estimator.measurement import Echo, MeasurementError, frequency_step
 from estimator.mirror_fit import FittedLine, Focus, fit_between, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
-from estimator.resolution import HALF_POWER, unaliased_sine
+from estimator.resolution import unaliased_sine
 from estimator.wavefront_bend import bent_intensities, coherence
 from estimator.windows import SURVEY_TAPER, frequency_taper, survey_weights
 
@@ -42,8 +51,6 @@ range. Of the lines that clouds and grating lobes feign, from half to all of the
 WALL_COHERENCE = 0.2
 """Median coherence of the peaks on a wall that does not reflect the array in itself. Of the same
 walls it was 0.3 to 0.98; of what the ambiguities of range and angle feign, 0.04 and 0.1. [-]"""
-EDGE_DEVIATIONS = 3.0
-"""Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
 MOST_CANDIDATES = 8
 """Lines sought among all peaks, bent ones included."""
 MOST_UNCERTAIN = 0.5
@@ -192,18 +199,18 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         *find_lines(looked.peaks[one_wave], coarse, most=MOST_CANDIDATES),
     ]
     farthest = echo_reach(echo)[1]
-    focuses = tuple(
+    plain, tapered = (
         focus_within(prepare(range_profiles(echo, weights=weights)), farthest)
         for weights in (None, survey_weights(echo))
     )
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
     lines = [
         line
-        for line in _best_of(_fitted(echo, looked, candidates, *focuses), coarse)
-        if not _is_edge_on(line, half)
+        for line in _best_of(_fitted(echo, looked, candidates, plain, tapered), coarse)
+        if not is_edge_on(line, half)
     ]
-    lines = _cut_where_they_cross(lines, echo_resolution(echo), *focuses)
-    in_sight = [line for line in lines if not _is_hidden(line, lines)]
+    lines = _cut_where_they_cross(lines, echo_resolution(echo), plain, tapered)
+    in_sight = [line for line in lines if not is_hidden(line, lines)]
     # Behind a mirror are clouds as well: there only what is seen, not scattered twice, counts.
     behind = np.array(
         [
@@ -214,11 +221,11 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         dtype=bool,
     )
     ghosts = find_lines(looked.peaks[one_wave & ~looked.bent & behind], coarse)
-    for line in _best_of(_fitted(echo, looked, ghosts, *focuses), coarse):
-        if any(_overlap(line, known, coarse) for known in in_sight):
+    for line in _best_of(_fitted(echo, looked, ghosts, plain, tapered), coarse):
+        if any(overlap(line, known, coarse) for known in in_sight):
             continue
-        if _is_hidden(line, in_sight) and not _is_edge_on(line, half):
-            in_sight.append(line)
+        if is_hidden(line, in_sight) and not is_edge_on(line, half):
+            in_sight.append(_to_its_ends(line, plain, tapered, echo_resolution(echo), half))
     return tuple(sorted(in_sight, key=lambda line: -line.level))
 
 
@@ -275,27 +282,11 @@ def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
     return reflects or float(np.median(coherent)) >= WALL_COHERENCE
 
 
-def _is_edge_on(line: FittedLine, half: float) -> bool:
-    """Tell whether a line points at the array, which so sees both faces: it mirrors to neither.
-
-    Parameters
-    ----------
-    line
-        In the array's frame.
-    half
-        Half the length of the array. [m]
-    """
-    normal = np.array([line.direction[1], -line.direction[0], 0.0])
-    deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
-    reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
-    return abs(float(line.middle @ normal)) < reach
-
-
 def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine]:
     """Of lines that lie on each other keep the one with the most energy along it."""
     kept: list[FittedLine] = []
     for line in sorted(lines, key=lambda one: -one.level * one.length):
-        if not any(_overlap(line, one, coarse) for one in kept):
+        if not any(overlap(line, one, coarse) for one in kept):
             kept.append(line)
     return kept
 
@@ -328,17 +319,15 @@ def _cut_where_they_cross(
     return cut
 
 
-def _overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
-    """Tell whether a good part of a line lies on another."""
-    points = np.linspace(line.start, line.end, 9)
-    return bool(np.mean([lies_on(point, other, coarse) for point in points]) > 1 / 3)
-
-
-def _is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
-    """Tell whether a good part of a line is behind others."""
-    points = np.linspace(line.start, line.end, 9)
-    before = [other for other in others if other is not line]
-    return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
+def _to_its_ends(
+    line: FittedLine, plain: Focus, tapered: Focus, resolution: Resolution, half: float
+) -> FittedLine:
+    """Cut a hidden line where its face ends."""
+    ends = face_ends(line, plain, resolution, half)
+    if ends[0] is line.start and ends[1] is line.end:
+        return line
+    shorter = fit_between(plain, tapered, *ends, resolution, trials=1)
+    return line if shorter is None else replace(shorter, confidence=line.confidence)
 
 
 def focus_within(focuser: Focuser, farthest: float) -> Focus:
@@ -368,31 +357,3 @@ def loose_peaks(
             and not any(hides(line, peak) for line in lines)
         ]
     ).reshape(-1, 3)
-
-
-def coarse_resolution(fine: Resolution) -> Resolution:
-    """Return the resolution of the survey, which its taper widens."""
-    wider = SURVEY_TAPER.half_power_width / HALF_POWER
-    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
-
-
-def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
-    """Tell whether a line stands between the array and a point."""
-    far = float(np.linalg.norm(point))
-    hit = crossing(np.zeros(3), point / far, line.start, line.end)
-    return hit is not None and hit[0] < far
-
-
-def lies_on(
-    point: Float[np.ndarray, " 3"],
-    line: FittedLine,
-    resolution: Resolution,
-    *,
-    margin: float = 0.0,
-) -> bool:
-    """Tell whether a point is on a segment, within two cells across and a margin along it."""
-    normal = np.array([line.direction[1], -line.direction[0], 0.0])
-    beside = abs(float((point - line.middle) @ normal))
-    along = abs(float((point - line.middle) @ line.direction))
-    reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
-    return beside < 2 * float(resolution.cell(point, normal)) and along < reach

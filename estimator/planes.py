@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float
 from scipy.spatial import ConvexHull
 
 from estimator.backprojection import prepare
-from estimator.line_search import Resolution
+from estimator.line_search import Resolution, coarse_resolution
 from estimator.measurement import Echo
-from estimator.mirrors import coarse_resolution, focus_within
+from estimator.mirrors import focus_within
 from estimator.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.plane_fit import (
     FittedPlane,

@@ -8,9 +8,8 @@ import scipy.ndimage
 from jaxtyping import Bool, Complex, Float
 from scipy.spatial import cKDTree
 
-from estimator.line_search import FALSE_ALARM, Resolution
+from estimator.line_search import FALSE_ALARM, Resolution, coarse_resolution
 from estimator.measurement import Echo
-from estimator.mirrors import coarse_resolution
 from estimator.planar_array import PlanarArray, planar_resolution
 from estimator.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.planes import detect_planes, lobe_of_a_wall

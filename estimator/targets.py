@@ -9,10 +9,11 @@ from scipy.ndimage import label
 
 from estimator.diffuse_cloud import between, in_cloud
 from estimator.estimate import Target
-from estimator.line_search import Resolution
+from estimator.line_relations import lies_on
+from estimator.line_search import Resolution, coarse_resolution
 from estimator.mirror_chains import image_over, possible_chains, seen_over, unfolded
 from estimator.mirror_fit import FittedLine
-from estimator.mirrors import Survey, coarse_resolution, lies_on
+from estimator.mirrors import Survey
 from estimator.projection import Wall, crossing, mirrored
 from estimator.resolution import HALF_POWER
 from estimator.wall_folding import FoldedWalls, place_covariance

@@ -1,0 +1,64 @@
+"""How lines of an image lie to points and to each other, seen from the array."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.line_search import Resolution
+from estimator.mirror_fit import FittedLine, across
+from estimator.projection import crossing
+
+EDGE_DEVIATIONS = 3.0
+"""Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
+
+
+def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
+    """Tell whether a line stands between the array and a point."""
+    far = float(np.linalg.norm(point))
+    hit = crossing(np.zeros(3), point / far, line.start, line.end)
+    return hit is not None and hit[0] < far
+
+
+def lies_on(
+    point: Float[np.ndarray, " 3"],
+    line: FittedLine,
+    resolution: Resolution,
+    *,
+    margin: float = 0.0,
+) -> bool:
+    """Tell whether a point is on a segment, within two cells across and a margin along it."""
+    normal = across(line.start, line.end)
+    beside = abs(float((point - line.middle) @ normal))
+    along = abs(float((point - line.middle) @ line.direction))
+    reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
+    return beside < 2 * float(resolution.cell(point, normal)) and along < reach
+
+
+def overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
+    """Tell whether a good part of a line lies on another."""
+    points = np.linspace(line.start, line.end, 9)
+    return bool(np.mean([lies_on(point, other, coarse) for point in points]) > 1 / 3)
+
+
+def is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
+    """Tell whether a good part of a line is behind others."""
+    points = np.linspace(line.start, line.end, 9)
+    before = [other for other in others if other is not line]
+    return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
+
+
+def is_edge_on(line: FittedLine, half: float) -> bool:
+    """Tell whether a line points at the array, which so sees both faces: it mirrors to neither.
+
+    Parameters
+    ----------
+    line
+        In the array's frame.
+    half
+        Half the length of the array. [m]
+    """
+    normal = across(line.start, line.end)
+    deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
+    reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
+    return abs(float(line.middle @ normal)) < reach
