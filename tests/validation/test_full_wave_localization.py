@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from scenes.library import load_scenario
 from scenes.shapes import object_surface
@@ -14,6 +15,7 @@ from validation.experiments.full_wave_localization import (
     Located,
     Trial,
     correlation,
+    draw,
     fails,
     localization,
     noisy_measurement,
@@ -114,3 +116,17 @@ def test_a_user_is_found_from_full_waves_at_half_size() -> None:
     assert fails(case) == []
     assert case.trials[0].echo_correlation > 0.94  # stored reference 0.970, of other draws
     assert case.trials[0].uplink_correlation > 0.999
+
+
+def test_the_figure_shows_each_realisation_and_the_limits() -> None:
+    worse = replace(RIGHT, error=2e-4)
+    case = Case(
+        name=SMOOTH_NAME, trials=tuple(replace(TRIAL, seed=i, simulated=worse) for i in range(3))
+    )
+    figure = Figure()
+    ax = figure.subplots()
+    draw(ax, case)
+    full_wave, simulated, *limits = ax.lines
+    np.testing.assert_allclose(full_wave.get_ydata(), 0.1)  # type: ignore[arg-type]
+    np.testing.assert_allclose(simulated.get_ydata(), 0.2)  # type: ignore[arg-type]
+    assert len(limits) == 2

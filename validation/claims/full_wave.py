@@ -202,7 +202,8 @@ def located(effort: Effort, tell: Tell) -> Finding:
                 origin="the 99.9 % region",
             ),
             *_error_rows(name, errors, trials),
-        ]
+        ],
+        draw=lambda figure: full_wave_localization.draw(figure.subplots(), found),
     )
 
 

@@ -30,6 +30,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Complex
+from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from estimator.localization import locate
@@ -277,6 +278,26 @@ def summary(case: Case) -> str:
             f"{angles.max():.4f}°, {np.median(offsets):.4f} and {offsets.max():.4f} mm"
         )
     return f"{case.name}, {len(case.trials)} realisations: {'; '.join(cells)}"
+
+
+def draw(ax: Axes, case: Case) -> None:
+    """Draw the user's error in each realisation, on full-wave and on simulated data."""
+    seeds = [trial.seed for trial in case.trials]
+    for what, marker, label in (
+        ("full_wave", "o", "full wave"),
+        ("simulated", "x", "simulated, the same wall and noise"),
+    ):
+        errors = [1e3 * getattr(trial, what).error for trial in case.trials]
+        ax.semilogy(seeds, errors, marker, label=label)
+    ax.axhline(1e3 * MOST_MEDIAN, color="0.5", ls="--", label="limit of the median")
+    ax.axhline(1e3 * MOST_WORST, color="0.5", label="limit of each")
+    ax.set(
+        xlabel="realisation of roughness and noise",
+        ylabel="error of the user [mm]",
+        title=f"slam_2d, wall of {case.name} rms and correlation",
+    )
+    ax.grid(alpha=0.3, which="both")
+    ax.legend()
 
 
 def fails(case: Case) -> list[str]:

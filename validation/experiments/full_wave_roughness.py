@@ -263,10 +263,11 @@ def draw_on(figure: Figure, comparisons: tuple[Comparison, ...]) -> None:
         level = f"{name}: simulated over full wave [dB]"
         _draw_panel(axes[1, column], comparisons, name, level, level=True)
     figure.suptitle(
-        "Where the ray-traced model may be trusted: conducting wall, 220 to 295 GHz, 45°, TM, "
-        "against a method of moments on the same\nfrozen profiles. Outlined: correlated by "
-        f"{TRUSTED_CORRELATION:g} or more and within {TRUSTED_LEVEL_DB:g} dB. Lower left: Bragg "
-        f"scattering ({BRAGG_DB:+.1f} dB); upper left: only the edges echo ({EDGES_DB:+.1f} dB)."
+        "Where the ray-traced model may be trusted: conducting wall, 220 to 295 GHz, 45°, TM,\n"
+        "against a method of moments on the same frozen profiles.\n"
+        f"Outlined: correlated by {TRUSTED_CORRELATION:g} or more and within "
+        f"{TRUSTED_LEVEL_DB:g} dB. Lower left: Bragg scattering ({BRAGG_DB:+.1f} dB);\n"
+        f"upper left: only the edges echo ({EDGES_DB:+.1f} dB)."
     )
 
 
