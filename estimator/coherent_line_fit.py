@@ -30,7 +30,7 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
 
 from estimator.measurement import Echo, frequency_step
-from estimator.mirror_fit import across
+from estimator.projection import unit_normal
 
 OVERSAMPLING = 1.2
 """Scatterers of the row, over those that hold all of the speckle that the echo can show. Fewer
@@ -120,7 +120,7 @@ def fit_coherently(
         along = (end - start) / length
         row = 0.5 * (start + end) + places[:, None] * along
         echoes, by_range = _echoes(thinned, profiles, row)
-        closing = _range_slopes(thinned, row, across(start, end))
+        closing = _range_slopes(thinned, row, unit_normal(start, end))
         slopes = by_range * np.repeat(closing, len(profiles.ranges), axis=0)
         if beside is not None:
             echoes = np.concatenate([echoes, beside], axis=1)
@@ -178,7 +178,7 @@ def _moved(
     start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], step: Float[np.ndarray, " 2"]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
     """Displace a line along its normal, and its ends by so much more and less."""
-    normal = across(start, end)
+    normal = unit_normal(start, end)
     return start + (step[0] - step[1]) * normal, end + (step[0] + step[1]) * normal
 
 

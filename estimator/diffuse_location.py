@@ -144,11 +144,9 @@ def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) ->
 
 def _of_the_wall(position: Float[np.ndarray, " 3"], wall: Wall) -> Float[np.ndarray, "3 3"]:
     """Covariance of a position that is known relative to a wall, from that of the wall."""
-    along = (wall.end - wall.start) / np.linalg.norm(wall.end - wall.start)
-    normal = np.array([along[1], -along[0], 0.0])
     lever = position - 0.5 * (wall.start + wall.end)
     turned = np.array([-lever[1], lever[0], 0.0])
-    jacobian = np.stack([turned, normal], axis=-1)
+    jacobian = np.stack([turned, wall.normal], axis=-1)
     covariance: np.ndarray = jacobian @ wall.covariance @ jacobian.T
     return covariance
 

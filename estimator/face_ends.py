@@ -11,8 +11,10 @@ from jaxtyping import Float
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import maximum_filter1d
 
+from estimator.line_extent import CELLS_AT_END, END_LEVEL
+from estimator.line_sampling import Focus
 from estimator.line_search import Resolution
-from estimator.mirror_fit import CELLS_AT_END, END_LEVEL, FittedLine, Focus
+from estimator.mirror_fit import FittedLine
 
 PLACES_PER_CELL = 4
 ASIDE = 0.75

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from estimator.line_sampling import Focus
 from estimator.mirror_chains import Chain, image_over, possible_chains, seen_over
-from estimator.mirror_fit import Focus
 from estimator.projection import Wall
 
 

@@ -9,9 +9,10 @@ from jaxtyping import Float
 from estimator.backprojection import prepare
 from estimator.coherent_line_fit import fit_coherently
 from estimator.line_relations import lies_on
+from estimator.line_sampling import Focus
 from estimator.line_search import Resolution, coarse_resolution
 from estimator.measurement import Echo
-from estimator.mirror_fit import FittedLine, Focus, across
+from estimator.mirror_fit import FittedLine
 from estimator.mirrors import (
     Survey,
     echo_reach,
@@ -99,7 +100,7 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
         line.start,
         line.end,
         cell_along=along,
-        cell_across=float(resolution.cell(line.middle, across(line.start, line.end))),
+        cell_across=float(resolution.cell(line.middle, line.normal)),
         beyond=(beyond[0], beyond[1]),
         others=others.reshape(-1, 3),
     )

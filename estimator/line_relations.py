@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.line_search import Resolution
-from estimator.mirror_fit import FittedLine, across
+from estimator.mirror_fit import FittedLine
 from estimator.projection import crossing
 
 EDGE_DEVIATIONS = 3.0
@@ -28,7 +28,7 @@ def lies_on(
     margin: float = 0.0,
 ) -> bool:
     """Tell whether a point is on a segment, within two cells across and a margin along it."""
-    normal = across(line.start, line.end)
+    normal = line.normal
     beside = abs(float((point - line.middle) @ normal))
     along = abs(float((point - line.middle) @ line.direction))
     reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
@@ -58,7 +58,7 @@ def is_edge_on(line: FittedLine, half: float) -> bool:
     half
         Half the length of the array. [m]
     """
-    normal = across(line.start, line.end)
+    normal = line.normal
     deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
     reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
     return abs(float(line.middle @ normal)) < reach

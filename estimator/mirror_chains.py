@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from estimator.projection import Wall, mirrored
+from estimator.projection import Wall, mirrored, unit_normal
 
 DEEPEST = 4
 """Longest chain of mirrors that is unfolded."""
@@ -58,7 +58,7 @@ def unfolded(
         chains[going, bounce] = first
         place[going] += nearest[:, None] * heading[going]
         left[going] -= nearest
-        normals = np.stack([_normal(wall) for wall in walls])[first]
+        normals = np.stack([wall.normal for wall in walls])[first]
         turn = np.einsum("px,px->p", heading[going], normals)
         heading[going] -= 2 * turn[:, None] * normals
     return place + left[:, None] * heading, chains
@@ -104,8 +104,7 @@ def _behind(image: Float[np.ndarray, "2 3"], walls: Sequence[Wall], chain: Chain
     """Tell whether part of a segment of the image lies beyond the image of a chain's last wall."""
     last = walls[chain[-1]]
     door = image_over(np.stack([last.start, last.end]), walls, chain[:-1])
-    along = door[1] - door[0]
-    normal = np.array([along[1], -along[0], 0.0])
+    normal = unit_normal(door[0], door[1])
     here = float(door[0] @ normal)
     return bool(np.any((image @ normal - here) * np.sign(here) > 0))
 
@@ -128,16 +127,11 @@ def seen_over(
     return seen
 
 
-def _normal(wall: Wall) -> Float[np.ndarray, " 3"]:
-    along = (wall.end - wall.start) / np.linalg.norm(wall.end - wall.start)
-    return np.array([along[1], -along[0], 0.0])
-
-
 def _crossings(
     origins: Float[np.ndarray, "rays 3"], headings: Float[np.ndarray, "rays 3"], wall: Wall
 ) -> Float[np.ndarray, " rays"]:
     """Return the distance at which each ray meets a wall; infinity if it does not. [m]."""
-    normal, along = _normal(wall), wall.end - wall.start
+    normal, along = wall.normal, wall.end - wall.start
     towards = headings @ normal
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (wall.start - origins) @ normal / towards

@@ -23,19 +23,24 @@ The summit is that of a paraboloid fitted over most of a cell. The covariance co
 unevenly the parts of the wall push the line.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 from scipy.special import gammaincc
 
-from estimator.line_search import GAP, Resolution
+from estimator.line_extent import lit_extent
+from estimator.line_sampling import (
+    Focus,
+    cell_across,
+    cell_along,
+    levels,
+    places_along,
+    trial_points,
+)
+from estimator.line_search import Resolution
+from estimator.projection import unit_normal
 
-Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
-"""Focuses the echo on points."""
-
-SAMPLES_PER_CELL = 2
 TRIALS = 9
 """Trial angles and trial offsets of each round."""
 ROUNDS = 4
@@ -65,16 +70,6 @@ FEWEST_PLACES = 4
 """Places along a line that still have modes of a higher order than its tilt."""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
-CELLS_CUT = 2.0
-"""Cells left out at either end: the sidelobes of an end, which lean, would tilt the line."""
-CELLS_AT_END = 12.0
-"""Cells either side of a wall's rough end that are searched for it."""
-CELLS_OF_STEP = 3.0
-"""Cells either side of an end whose mean levels differ most: speckle in so many leaves their mean
-a deviation of 3 dB, and walls end by tens of decibels."""
-END_LEVEL = 0.1
-"""Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
-of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +88,11 @@ class FittedLine:
         """Midpoint. [m]."""
         middle: np.ndarray = 0.5 * (self.start + self.end)
         return middle
+
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """Unit normal, to the right of start to end."""
+        return unit_normal(self.start, self.end)
 
     @property
     def length(self) -> float:
@@ -139,7 +139,7 @@ def fit_line(
     """
     for half_width in (1.0, 0.3):  # in cells: once for the extent, once at the final extent
         refined = _refined(focus, start, end, resolution, half_width)
-        extent = _extent(tapered, *refined, resolution, reach)
+        extent = lit_extent(tapered, *refined, resolution, reach)
         if extent is None:
             return None
         start, end = extent
@@ -161,11 +161,11 @@ def fit_between(
     -------
     The line, or ``None`` if it is too short to have an angle.
     """
-    if _places(start, end, resolution).size < FEWEST_PLACES:
+    if places_along(start, end, resolution).size < FEWEST_PLACES:
         return None
     start, end, covariance = _summit(focus, start, end, resolution)
-    level, background = _levels(tapered, start, end, resolution)
-    cells = np.linalg.norm(end - start) / _cell_along(start, end, resolution)
+    level, background = levels(tapered, start, end, resolution)
+    cells = np.linalg.norm(end - start) / cell_along(start, end, resolution)
     # The mean of n exponential variables is Gamma distributed; a trial is any line tried.
     false = float(gammaincc(cells, cells * level / background)) * trials
     return FittedLine(
@@ -178,62 +178,6 @@ def fit_between(
     )
 
 
-def across(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-    """Return a line's unit normal: its direction turned by -90 degrees in the array's plane."""
-    along = (end - start) / np.linalg.norm(end - start)
-    return np.array([along[1], -along[0], 0.0])
-
-
-def _cell_along(
-    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
-) -> float:
-    direction = (end - start) / np.linalg.norm(end - start)
-    return float(resolution.cell(0.5 * (start + end), direction))
-
-
-def _cell_across(
-    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
-) -> float:
-    return float(resolution.cell(0.5 * (start + end), across(start, end)))
-
-
-def _places(
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-    resolution: Resolution,
-    per_cell: int = SAMPLES_PER_CELL,
-) -> Float[np.ndarray, " places"]:
-    """Sample a segment without its very ends, measured from its midpoint. [m]."""
-    length = float(np.linalg.norm(end - start))
-    cell = _cell_along(start, end, resolution)
-    length -= min(2 * CELLS_CUT * cell, 0.5 * length)
-    count = max(2, round(per_cell * length / cell))
-    places: np.ndarray = (np.arange(count) + 0.5) / count * length - length / 2
-    return places
-
-
-def _trial_points(
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-    places: Float[np.ndarray, " places"],
-    tilts: Float[np.ndarray, " tilts"],
-    offsets: Float[np.ndarray, " offsets"],
-) -> Float[np.ndarray, "tilts offsets places 3"]:
-    """Points of lines turned about the midpoint (counter-clockwise) and moved along the normal."""
-    along = (end - start) / np.linalg.norm(end - start)
-    normal = across(start, end)
-    # The normal is the tangent turned by −90°, so a turn by δ moves the tangent by −δ·normal.
-    tangents = np.cos(tilts)[:, None] * along - np.sin(tilts)[:, None] * normal
-    normals = np.cos(tilts)[:, None] * normal + np.sin(tilts)[:, None] * along
-    middle = 0.5 * (start + end)
-    points: np.ndarray = (
-        middle
-        + offsets[None, :, None, None] * normals[:, None, None, :]
-        + places[None, None, :, None] * tangents[:, None, None, :]
-    )
-    return points
-
-
 def _refined(
     focus: Focus,
     start: Float[np.ndarray, " 3"],
@@ -242,88 +186,22 @@ def _refined(
     half_width: float,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
     """Maximise J over a neighbourhood of so many cells, by ever finer grids."""
-    places = _places(start, end, resolution)
-    width = half_width * _cell_across(start, end, resolution)
+    places = places_along(start, end, resolution)
+    width = half_width * cell_across(start, end, resolution)
     length = float(np.linalg.norm(end - start))
     tilt = offset = 0.0
     for _ in range(ROUNDS):
         tilts = tilt + np.linspace(-2, 2, TRIALS) * width / length
         offsets = offset + np.linspace(-1, 1, TRIALS) * width
-        magnitude = np.abs(focus(_trial_points(start, end, places, tilts, offsets)))
+        magnitude = np.abs(focus(trial_points(start, end, places, tilts, offsets)))
         objective = magnitude.sum(axis=-1)
         row, column = np.unravel_index(int(np.argmax(objective)), objective.shape)
         tilt, offset = float(tilts[row]), float(offsets[column])
         width /= 3
-    ends = _trial_points(
+    ends = trial_points(
         start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
     )[0, 0]
     return ends[0], ends[1]
-
-
-def _extent(
-    focus: Focus,
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-    resolution: Resolution,
-    reach: tuple[float, float],
-) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]] | None:
-    """Follow the line both ways until more than :data:`GAP` cells are dark."""
-    along = (end - start) / np.linalg.norm(end - start)
-    middle = 0.5 * (start + end)
-    step = _cell_along(start, end, resolution) / SAMPLES_PER_CELL
-    count = int(np.ceil(np.linalg.norm(end - start) / step)) + 1
-    more = count  # as far again on either side
-    places = (np.arange(-more, count + more) - (count - 1) / 2) * step
-    points = middle + places[:, None] * along
-    distance = np.linalg.norm(points, axis=-1)
-    inside = (distance > reach[0]) & (distance < reach[1]) & (points[:, 1] > 0)
-    places, points = places[inside], points[inside]
-    intensity = np.abs(focus(points)) ** 2
-    within = np.abs(places) <= np.linalg.norm(end - start) / 2
-    level = float(np.median(intensity[within])) / np.log(2)
-    background = _levels(focus, start, end, resolution)[1]
-    # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
-    halfway = np.sqrt(level * background)
-    occupied = np.nonzero(intensity > halfway)[0]
-    if not within.any() or level < background or len(occupied) == 0:
-        return None
-    runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
-    run = max(runs, key=len)
-    if len(run) < 2 or len(run) < 0.3 * (run[-1] - run[0] + 1):
-        return None
-    level_db = 10 * np.log10(np.maximum(intensity, halfway))
-    outermost = len(places) - 1
-    first = _end_of(level_db, int(run[0]))
-    last = outermost - _end_of(level_db[::-1], outermost - int(run[-1]))
-    if last - first < 2:
-        return None
-    return middle + places[first] * along, middle + places[last] * along
-
-
-def _end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:
-    """Return the first place that is wall, on a line that comes from outside.
-
-    The end is the highest step between the means, in decibels, of the cells before it and after.
-    What is scattered twice around a face that is seen over a mirror is a dim shoulder before its
-    end; a face may also be tens of decibels brighter in its middle than at its ends.
-
-    Parameters
-    ----------
-    level_db
-        Intensity from outside to inside; not below what counts as dark. [dB]
-    rough
-        About where the wall begins.
-    """
-    near, wide = round(CELLS_AT_END * SAMPLES_PER_CELL), round(CELLS_OF_STEP * SAMPLES_PER_CELL)
-    sums = np.concatenate([[0.0], np.cumsum(np.pad(level_db, wide, mode="edge"))])
-    means = (sums[wide:] - sums[:-wide]) / wide
-    steps = means[wide:-1] - means[: -wide - 1]  # after place i, less before it
-    start = max(0, rough - near)
-    step = start + int(np.argmax(steps[start : rough + near]))
-    # A minimum of the speckle may be a higher step than the wall's end, a few cells further out.
-    enough = np.median(level_db[step : step + near]) + 10 * np.log10(END_LEVEL / np.log(2))
-    outer = max(0, step - 2 * wide)
-    return outer + int(np.argmax(np.append(level_db[outer:step] > enough, True)))
 
 
 def _summit(
@@ -337,23 +215,23 @@ def _summit(
     K is a sum over places i, :math:`w_i (c_i + g_i x + h_i x^2 / 2)` near the summit. Where the
     gradients :math:`g_i` of all places move the line is told by their smooth modes.
     """
-    places = _places(start, end, resolution, SUMMIT_SAMPLES_PER_CELL)
+    places = places_along(start, end, resolution, SUMMIT_SAMPLES_PER_CELL)
     reach = 0.5 * len(places) * float(places[1] - places[0])  # half of the length in use
     levers = places / reach
     weights = 1 - levers**2
     length = float(np.linalg.norm(end - start))
-    width = SUMMIT * _cell_across(start, end, resolution)
+    width = SUMMIT * cell_across(start, end, resolution)
     scale = np.array([width / reach, width])
     unit = np.linspace(-1, 1, TRIALS)
     x, y = (axis.ravel() for axis in np.meshgrid(unit, unit, indexing="ij"))
     basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=-1)
     for _ in range(PASSES):
-        points = _trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
+        points = trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
         brightness = np.abs(focus(points)) ** BRIGHTNESS
         total = np.linalg.lstsq(basis, (brightness @ weights).ravel())[0]
         bread = np.linalg.inv(total[[3, 4, 4, 5]].reshape(2, 2))
         tilt, offset = scale * np.clip(-bread @ total[1:3], -1.0, 1.0)
-        ends = _trial_points(
+        ends = trial_points(
             start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
         )[0, 0]
         start, end = ends[0], ends[1]
@@ -402,20 +280,3 @@ def _slow_power(
     assert likeliest is not None
     least = LEAST_POWER * float(np.mean(pushes**2))
     return max(likeliest[1], least), max(likeliest[2], least)
-
-
-def _levels(
-    focus: Focus,
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-    resolution: Resolution,
-) -> tuple[float, float]:
-    """Mean intensity along the line, and the median-based one of lines beside it."""
-    places = _places(start, end, resolution)
-    cell = _cell_across(start, end, resolution)
-    beside = cell * np.array([-12.0, -10.0, -8.0, -6.0, 0.0, 6.0, 8.0, 10.0, 12.0])
-    points = _trial_points(start, end, places, np.zeros(1), beside)[0]
-    intensity = np.abs(focus(points)) ** 2
-    on = len(beside) // 2
-    around = np.delete(intensity, on, axis=0)
-    return float(intensity[on].mean()), float(np.median(around) / np.log(2))

@@ -16,6 +16,7 @@ from estimator.line_relations import (
     lies_on,
     overlap,
 )
+from estimator.line_sampling import Focus
 from estimator.line_search import (
     LineCandidate,
     Resolution,
@@ -26,7 +27,7 @@ from estimator.line_search import (
     significant_peaks,
 )
 from estimator.measurement import Echo, MeasurementError, frequency_step
-from estimator.mirror_fit import FittedLine, Focus, fit_between, fit_line
+from estimator.mirror_fit import FittedLine, fit_between, fit_line
 from estimator.projection import crossing
 from estimator.range_profiles import range_profiles
 from estimator.resolution import unaliased_sine
@@ -261,9 +262,8 @@ def _fitted(
             continue
         if line.length < LEAST_CELLS * float(resolution.cell(line.middle, line.direction)):
             continue
-        across = np.array([line.direction[1], -line.direction[0], 0.0])
         uncertain = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
-        if np.any(uncertain > MOST_UNCERTAIN * float(resolution.cell(line.middle, across))):
+        if np.any(uncertain > MOST_UNCERTAIN * float(resolution.cell(line.middle, line.normal))):
             continue
         if _is_of_waves(line, looked, coarse):
             lines.append(line)

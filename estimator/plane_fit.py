@@ -18,8 +18,8 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 from scipy.special import gammaincc
 
+from estimator.line_sampling import Focus
 from estimator.line_search import DYNAMIC_RANGE, Resolution
-from estimator.mirror_fit import Focus
 from estimator.projection_3d import PlaneWall, within
 
 SUMMIT = 0.6

@@ -11,6 +11,14 @@ GRAZING = 1e-9
 """Least distance from one bounce to the next. [m]."""
 
 
+def unit_normal(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, " 3"]:
+    """Return a line's unit normal: its direction turned by -90 degrees in the array's plane."""
+    along = (end - start) / np.linalg.norm(end - start)
+    return np.array([along[1], -along[0], 0.0])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Wall:
     """A flat mirror in the array's plane, with what is known of its line."""
@@ -19,13 +27,17 @@ class Wall:
     end: Float[np.ndarray, " 3"]  # [m]
     covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
 
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """Unit normal, to the right of start to end."""
+        return unit_normal(self.start, self.end)
+
     def moved(self, *, tilt: float, offset: float) -> "Wall":
         """Turn the wall about its midpoint (counter-clockwise) and move it along its normal."""
         middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
         cosine, sine = np.cos(tilt), np.sin(tilt)
         turned = np.array([cosine * half[0] - sine * half[1], sine * half[0] + cosine * half[1], 0])
-        normal = np.array([turned[1], -turned[0], 0.0]) / np.linalg.norm(turned)
-        middle = middle + offset * normal
+        middle = middle + offset * unit_normal(middle - turned, middle + turned)
         return Wall(start=middle - turned, end=middle + turned, covariance=self.covariance)
 
 
@@ -46,8 +58,7 @@ def mirrored(
     end: Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, "*n 3"]:
     """Mirror points about the line through two points of the array's plane. [m]."""
-    along = (end - start) / np.linalg.norm(end - start)
-    normal = np.array([along[1], -along[0], 0.0])
+    normal = unit_normal(start, end)
     images: np.ndarray = points - 2 * ((points - start) @ normal)[..., None] * normal
     return images
 

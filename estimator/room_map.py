@@ -84,8 +84,7 @@ def targets_in_world(room: RoomMap, frame: ArrayFrame) -> tuple[Target, ...]:
 
 
 def _mirror(frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]) -> Mirror:
-    along = wall.end - wall.start
-    normal = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
+    normal = wall.normal
     middle = 0.5 * (wall.start + wall.end)
     if normal @ middle > 0:  # towards the array
         normal = -normal

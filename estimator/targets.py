@@ -14,7 +14,7 @@ from estimator.line_search import Resolution, coarse_resolution
 from estimator.mirror_chains import image_over, possible_chains, seen_over, unfolded
 from estimator.mirror_fit import FittedLine
 from estimator.mirrors import Survey
-from estimator.projection import Wall, crossing, mirrored
+from estimator.projection import Wall, crossing, mirrored, unit_normal
 from estimator.resolution import HALF_POWER
 from estimator.wall_folding import FoldedWalls, place_covariance
 from estimator.windows import SURVEY_TAPER
@@ -280,7 +280,7 @@ def _target(spot: Spot, folded: FoldedWalls, resolution: Resolution) -> Target:
             ends = mirrored(ends, folded.walls[index].start, folded.walls[index].end)
     reach = float(np.linalg.norm(spot.place))
     ray = spot.place / reach
-    across = np.array([ray[1], -ray[0], 0.0])
+    across = unit_normal(np.zeros(3), spot.place)
     ratio = spot.background / spot.intensity
     own = (
         DEVIATION**2
@@ -318,9 +318,8 @@ def _middle_covariance(wall: Wall) -> Float[np.ndarray, "3 3"]:
     along = wall.end - wall.start
     length = float(np.linalg.norm(along))
     along = along / length
-    normal = np.array([along[1], -along[0], 0.0])
     return np.asarray(
-        wall.covariance[1, 1] * np.outer(normal, normal)
+        wall.covariance[1, 1] * np.outer(wall.normal, wall.normal)
         + (END_SHARE * length) ** 2 / 2 * np.outer(along, along)
     )
 

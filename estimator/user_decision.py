@@ -327,10 +327,8 @@ def _vertices(
     place = np.zeros(3)
     vertices = [place]
     for wall, image in zip(chain, images[:0:-1], strict=True):
-        along = wall.end - wall.start
-        normal = np.array([along[1], -along[0], 0.0])
         ahead = image - place
-        share = float((wall.start - place) @ normal) / float(ahead @ normal)
+        share = float((wall.start - place) @ wall.normal) / float(ahead @ wall.normal)
         place = place + share * ahead
         vertices.append(place)
     return np.stack([*vertices, user])

@@ -145,12 +145,11 @@ def _folded(line: FittedLine, walls: Sequence[Wall], chain: Chain) -> Wall:
 def _is_one(line: FittedLine, folded: Wall, other: Wall, resolution: Resolution) -> bool:
     """Tell whether most of a line, once folded, lies on another wall, within a few cells."""
     along = (other.end - other.start) / np.linalg.norm(other.end - other.start)
-    normal = np.array([along[1], -along[0], 0.0])
     points = np.linspace(folded.start, folded.end, SAMPLES)
     # The cell is that of the image, where the line is farther away.
     images = np.linspace(line.start, line.end, SAMPLES)
-    across = np.array([line.direction[1], -line.direction[0], 0.0])
-    beside = np.abs((points - other.start) @ normal) < SAME_PLACE * resolution.cell(images, across)
+    cells = resolution.cell(images, line.normal)
+    beside = np.abs((points - other.start) @ other.normal) < SAME_PLACE * cells
     place = (points - other.start) @ along
     inside = (place > 0) & (place < np.linalg.norm(other.end - other.start))
     return bool(np.mean(beside & inside) > 0.5)
@@ -194,9 +193,8 @@ def _moves(moved: Sequence[Wall], walls: Sequence[Wall]) -> Float[np.ndarray, "w
     for new, old in zip(moved, walls, strict=True):
         along = (old.end - old.start) / np.linalg.norm(old.end - old.start)
         turned = (new.end - new.start) / np.linalg.norm(new.end - new.start)
-        normal = np.array([turned[1], -turned[0], 0.0])
         tilt = along[0] * turned[1] - along[1] * turned[0]
-        result.append((tilt, float((new.start - 0.5 * (old.start + old.end)) @ normal)))
+        result.append((tilt, float((new.start - 0.5 * (old.start + old.end)) @ new.normal)))
     return np.array(result).reshape(-1, 2)
 
 
