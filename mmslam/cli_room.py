@@ -128,6 +128,45 @@ def locate(
         print_outcome(outcome.result, outcome.folder, as_json)
 
 
+def track(
+    measurements: Annotated[
+        Path, typer.Argument(metavar="FILE.zarr", help="A dataset whose samples are times.")
+    ],
+    step: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Time between samples [what `time` in FILE says]."),
+    ] = None,
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M2_S3",
+            help="How freely users move: spectral density [0.5, of somebody who walks].",
+        ),
+    ] = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Follow users that move: locate them at each time, and join the answers to tracks.
+
+    Outliers are dropped, ambiguous answers decided, times without one bridged. Writes the tracks
+    and their figure to `--out` (default `out/FILE-track/`).
+    """
+    with told_clearly():
+        from mmslam.progress import StageProgress
+
+        with stdout_kept_clean(), StageProgress() as progress:
+            from mmslam.track_command import track_lines, track_to_folder
+
+            tracked = track_to_folder(
+                measurements, folder=out, step=step, acceleration=acceleration, progress=progress
+            )
+        if as_json:
+            print_json(tracked.document)
+            return
+        for line in track_lines(tracked.document, tracked.folder):
+            typer.echo(line)
+
+
 def _picture(show: bool, out: Path | None, name: str) -> Path | None:
     if not show:
         if out is not None:

@@ -1,6 +1,6 @@
 """Joins estimator and files for users that move: locate each sample of a dataset, then track."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from zarr.storage import LocalStore
 
-from estimator.estimate import Progress, UserEstimate
+from estimator.estimate import Estimate, Progress, UserEstimate
 from estimator.localization import locate
 from estimator.measurement import MeasurementError
 from estimator.storage import is_store, read_measurement
@@ -31,6 +31,7 @@ def track_store(
     step: float | None = None,
     acceleration: float = ACCELERATION,
     progress: Progress | None = None,
+    located: Callable[[Estimate], None] = lambda estimate: None,
 ) -> tuple[MovingUser, ...]:
     """Locate and track all users of a dataset whose samples are times.
 
@@ -45,6 +46,8 @@ def track_store(
         Spectral density, of the motion model. [m²/s³]
     progress
         Told each sample.
+    located
+        Told each sample's whole estimate.
 
     Returns
     -------
@@ -54,17 +57,27 @@ def track_store(
     Raises
     ------
     MeasurementError
-        If the store cannot be read, has no samples, or nobody says when they were measured.
+        If the store cannot be read, has no samples, or nobody says when they were measured, or no
+        sample holds a pilot.
     """
+    if not 0 < acceleration < np.inf:
+        raise MeasurementError(
+            f"acceleration = {acceleration:g} m²/s³: it must be above 0; somebody who walks has "
+            f"about {ACCELERATION:g}"
+        )
     times = _times(path, step)
     tell = progress or (lambda stage, done, total: None)
     tell("samples", 0, len(times))
     found: list[dict[str, UserEstimate]] = []
     for sample in range(len(times)):
         estimate = locate(read_measurement(path, sample=sample))
+        located(estimate)
         found.append({user.name: user for user in estimate.users})
         tell("samples", sample + 1, len(times))
-    return track_answers(times, found, acceleration=acceleration)
+    users = track_answers(times, found, acceleration=acceleration)
+    if not users:
+        raise MeasurementError(f"{path}: no sample holds an uplink; a track needs users' pilots")
+    return users
 
 
 def track_answers(
@@ -108,7 +121,7 @@ def _times(path: Path, step: float | None) -> list[float]:
             "measure at several times, or use `mmslam locate`"
         )
     if step is not None:
-        if not step > 0:
+        if not 0 < step < np.inf:
             raise MeasurementError(f"step = {step:g} s; the time between samples must be above 0")
         return [step * index for index in range(count)]
     if told is None:

@@ -14,6 +14,8 @@ from typing import Any
 RESULT = "result.json"
 MEASUREMENT = "measurement.zarr"
 REPORT = "report.html"
+TRACK = "track.json"
+TRACK_FIGURE = "track.png"
 FORMAT = 1
 
 FIGURES = ("raw_image.png", "corrected_image.png", "angle_range_map.png", "localization.png")
@@ -95,14 +97,24 @@ def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[P
 
 def refuse_foreign_results(folder: Path) -> str | None:
     """Say why a folder may not be replaced by new results; None if an earlier run made it."""
+    return _refuse_foreign(
+        folder, RESULT, {"users", "mirrors", "versions"}, {MEASUREMENT, REPORT, *FIGURES}
+    )
+
+
+def refuse_foreign_track(folder: Path) -> str | None:
+    """Say why a folder may not be replaced by a new track; None if an earlier one is in it."""
+    return _refuse_foreign(folder, TRACK, {"tracks", "versions"}, {TRACK_FIGURE})
+
+
+def _refuse_foreign(folder: Path, main: str, keys: set[str], beside: set[str]) -> str | None:
     names = {entry.name for entry in folder.iterdir()}
     if not names:
         return None
-    if not _is_result(folder / RESULT):
-        return f"it is not empty and no earlier run of mmslam made it (no {RESULT} of ours in it)"
-    foreign = sorted(
-        name for name in names - {RESULT, MEASUREMENT, REPORT, *FIGURES} if not name.startswith(".")
-    )
+    document = _json(folder / main)
+    if document.get("format") != FORMAT or not keys <= document.keys():
+        return f"it is not empty and no earlier run of mmslam made it (no {main} of ours in it)"
+    foreign = sorted(name for name in names - {main, *beside} if not name.startswith("."))
     if foreign:
         return f"it holds what mmslam did not write ({', '.join(foreign[:3])})"
     return None
@@ -158,11 +170,6 @@ def _exchange(new: Path, target: Path, old: Path) -> None:
         if replaced and old.exists() and not target.exists():
             old.rename(target)
         raise
-
-
-def _is_result(path: Path) -> bool:
-    result = _json(path)
-    return result.get("format") == FORMAT and {"users", "mirrors", "versions"} <= result.keys()
 
 
 def _json(path: Path) -> dict[str, Any]:

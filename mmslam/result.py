@@ -80,9 +80,14 @@ def result_document(
         "notes": estimate.notes,
         "timings_s": {**(timings or {}), **estimate.timings},
     }
-    plain = _plain(document)
-    assert isinstance(plain, dict)
-    return plain
+    return plain(document)
+
+
+def plain(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn what a document holds into what JSON knows; NaN and infinity become null."""
+    turned = _plain(document)
+    assert isinstance(turned, dict)
+    return turned
 
 
 def to_json(document: Mapping[str, Any]) -> str:
