@@ -11,18 +11,18 @@ Not in the thesis, which states no bound. Chosen:
   is swept.
   Whoever is measured knows nothing: the estimator's path search starts from the whole map.
 - *Rough wall*: ``slam_2d`` at half its size (128 elements, 401 frequencies, a wall of 20 cm 0.4 m
-  away; fewer frequencies do not image its far end at 0.48 m unambiguously, and the bound counts on
-  all of the wall), roughness and noise drawn anew for each trial. With the wall known the strongest path is
-  folded over the true mean plane; with the wall estimated the whole estimator answers. What it is
-  held against is the root of the sum of squares of the bound (noise, wall known), of the floor of
-  :mod:`validation.roughness_floor`, and, with the wall estimated, of what
+  away; fewer frequencies do not image its far end at 0.48 m unambiguously, and the bound counts
+  on all of the wall), roughness and noise drawn anew for each trial. With the wall known the
+  strongest path is folded over the true mean plane; with the wall estimated the whole estimator
+  answers. What it is held against is the root of the sum of squares of the bound (noise, wall
+  known), of the floor of :mod:`validation.roughness_floor`, and, with the wall estimated, of what
   :mod:`validation.echo_line_bound` leaves of the wall's place.
 
 Claims that are asserted: the rms error is within a factor of 1.5 of the bound from 0 dB upward, in
-every sweep of free space, and below it by no more than trial scatter (four standard deviations
-of an rms dominated by one coordinate); with a rough wall it is within a factor of 1.5 of bound
-and floor together from 0 dB upward if the wall is known, and within 2.5 if it is estimated: two
-times over a wall of 5 µm, whose ends outshine its speckle by 10 dB, one from 20 µm upward.
+every sweep of free space, and below it by no more than trial scatter (four standard deviations of
+an rms dominated by one coordinate); with a rough wall it is within a factor of 1.5 of bound and
+floor together from 0 dB upward if the wall is known, and within 2.5 if it is estimated: two times
+over a wall of 5 µm, whose ends outshine its speckle by 10 dB, one from 20 µm upward.
 """
 
 import csv
