@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from scenes.base_station import BaseStation
 from scenes.distributions import Drawn, Grid, Listed, Stepped
+from scenes.drawn_parameters import Parameter, parameter_of
 from scenes.geometry import with_geometry
 from scenes.library import ScenarioSource, scenario_names, scenario_source, set_keys
 from scenes.quantities import Checked
@@ -39,15 +40,6 @@ class Attempt:
     values: Mapping[str, object]  # as drawn, by key
     scenario: Scenario | None
     problem: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """A key that varies, as it is stored."""
-
-    key: str
-    kind: Literal["number", "position", "text"]
-    unit: str | None  # None: it has none, or is no number
 
 
 @dataclass(frozen=True)
@@ -158,7 +150,7 @@ class SampleSpace:
             for name in self.variations.number
         ]
         drawn: dict[str, Drawn | Stepped] = {**self.variations.vary, **self._copies}
-        return (*(_parameter(key, one) for key, one in drawn.items()), *numbers)
+        return (*(parameter_of(key, one) for key, one in drawn.items()), *numbers)
 
     def absent(self, values: Mapping[str, object]) -> tuple[str, ...]:
         """Name the tables, such as ``objects.post``, that a draw leaves out."""
@@ -398,39 +390,3 @@ def _of(model: type[Checked], table: Any, name: str) -> int:
         return int(getattr(model.model_validate(table), name))
     except ValidationError:
         return 0
-
-
-_UNITS = {
-    "m": "m",
-    "mm": "mm",
-    "m2": "m2",
-    "deg": "degree",
-    "rad": "rad",
-    "db": "dB",
-    "dbi": "dBi",
-    "dbsm": "dBsm",
-    "ghz": "GHz",
-    "ns": "ns",
-}
-
-
-def _parameter(key: str, drawn: Drawn | Stepped) -> Parameter:
-    values = drawn.extremes()
-    unit = _UNITS.get(key.rpartition("_")[2], "1")
-    if all(_is_number(value) for value in values):
-        return Parameter(key=key, kind="number", unit=unit)
-    if all(_is_position(value) for value in values):
-        return Parameter(key=key, kind="position", unit=unit)
-    return Parameter(key=key, kind="text", unit=None)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_position(value: object) -> bool:
-    return (
-        isinstance(value, list | tuple)
-        and len(value) in (2, 3)
-        and all(_is_number(entry) for entry in value)
-    )

@@ -20,7 +20,7 @@ from scenes.library import ScenarioSource
 from scenes.sample_space import SampleSpace, open_sample_space
 from scenes.variations import load_variations
 from simulator.dataset_config import DatasetConfig, differences, identity
-from simulator.dataset_layout import FAILED, Layout, dataset_layout
+from simulator.dataset_layout import Layout, dataset_layout
 from simulator.dataset_row import failed_row, make_row
 from simulator.dataset_store import (
     IDENTITY,
@@ -30,6 +30,7 @@ from simulator.dataset_store import (
     failed_samples,
     stored_array,
 )
+from simulator.dataset_variables import FAILED
 from simulator.resumable_work import (
     Result,
     Task,

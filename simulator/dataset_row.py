@@ -9,10 +9,12 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement import Measurement
 from estimator.storage import PARAMETERS, TRUTH
+from scenes.drawn_parameters import Parameter
 from scenes.objects import Plate
-from scenes.sample_space import Attempt, Parameter, SampleSpace, impossible_sample
+from scenes.sample_space import Attempt, SampleSpace, impossible_sample
 from scenes.scenario import Scenario, ScenarioError
-from simulator.dataset_layout import FAILED, MADE, Layout, fits
+from simulator.dataset_layout import Layout, fits
+from simulator.dataset_variables import FAILED, MADE
 
 Row = dict[str, np.ndarray]
 """Values of every variable of the layout, by its key."""

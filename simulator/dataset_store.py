@@ -14,9 +14,7 @@ Every file is written under another name, flushed to the disk and renamed. A sam
 
 import fcntl
 import json
-import os
 import shutil
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,8 +25,10 @@ import zarr
 from zarr.codecs import BloscCodec
 
 from simulator.dataset_config import differences
-from simulator.dataset_layout import FAILED, LABEL_SAMPLES, TEXT, Layout, Variable
+from simulator.dataset_layout import LABEL_SAMPLES, Layout
 from simulator.dataset_row import Row
+from simulator.dataset_variables import FAILED, TEXT, Variable
+from simulator.row_files import flush, is_whole, load_row, numbers_in, save_row
 
 JOB = "dataset.json"
 IDENTITY = ("config", "base", "versions", "code")
@@ -116,7 +116,7 @@ class GrowingDataset:
             if int(self._staged_row(sample)["status"]) == FAILED:
                 self._sample_file(sample).unlink()
         for block in self.collected():
-            labels = _load(self._block_file(block))
+            labels = load_row(self._block_file(block))
             if not np.any(labels["status"] == FAILED):
                 continue
             for at, sample in enumerate(self.layout.block_samples(block)):
@@ -149,11 +149,11 @@ class GrowingDataset:
 
     def staged(self) -> list[int]:
         """Return the samples that are done, but not in the store yet."""
-        return sorted(_numbers(self.folder / "samples"))
+        return sorted(numbers_in(self.folder / "samples"))
 
     def collected(self) -> list[int]:
         """Return the blocks that are in the store."""
-        return sorted(_numbers(self.folder / "blocks"))
+        return sorted(numbers_in(self.folder / "blocks"))
 
     def done(self) -> np.ndarray:
         """Tell for every sample whether it is done. [bool]."""
@@ -168,7 +168,7 @@ class GrowingDataset:
         """Return the samples that are done and have failed."""
         found = [n for n in self.staged() if int(self._staged_row(n)["status"]) == FAILED]
         for block in self.collected():
-            status = _load(self._block_file(block), only=("status",))["status"]
+            status = load_row(self._block_file(block), only=("status",))["status"]
             start = self.layout.block_samples(block).start
             found += [start + int(at) for at in np.flatnonzero(status == FAILED)]
         return sorted(found)
@@ -177,7 +177,7 @@ class GrowingDataset:
 
     def put(self, sample: int, row: Row) -> None:
         """Keep a sample's row."""
-        _save(self._sample_file(sample), row)
+        save_row(self._sample_file(sample), row)
 
     def collect(self, block: int) -> None:
         """Move all samples of a block from their files into the store.
@@ -196,7 +196,7 @@ class GrowingDataset:
                 array[samples.start : samples.stop] = np.stack(
                     [row.pop(variable.key) for row in rows]
                 )
-                _flush(self.store / variable.key / "c" / str(block))
+                flush(self.store / variable.key / "c" / str(block))
         self._write_block(block, {key: np.stack([row[key] for row in rows]) for key in rows[0]})
         self._unstage(samples)
 
@@ -207,14 +207,14 @@ class GrowingDataset:
         small = [one for one in self.layout.variables if not one.large]
         for first in range(0, self.layout.blocks, per_chunk):
             blocks = range(first, min(first + per_chunk, self.layout.blocks))
-            parts = [_load(self._block_file(block)) for block in blocks]
+            parts = [load_row(self._block_file(block)) for block in blocks]
             start = blocks.start * self.layout.block
             for variable in small:
                 values = np.concatenate([part[variable.key] for part in parts])
                 array = stored_array(group, variable.key)
                 array[start : start + len(values)] = _as_stored(variable, values)
         for variable in small:
-            _flush(self.store / variable.key)
+            flush(self.store / variable.key)
         self.store.rename(self.target)
         _remove(self.folder)
 
@@ -231,16 +231,16 @@ class GrowingDataset:
             self._sample_file(sample).unlink(missing_ok=True)
 
     def _staged_row(self, sample: int) -> Row:
-        return _load(self._sample_file(sample))
+        return load_row(self._sample_file(sample))
 
     def _write_block(self, block: int, labels: Row) -> None:
-        _save(self._block_file(block), labels)
+        save_row(self._block_file(block), labels)
 
     def _write_job(self) -> None:
         text = json.dumps({key: self.layout.attributes[key] for key in IDENTITY})
         part = self.folder / f"{JOB}.part"
         part.write_text(text, encoding="utf-8")
-        _flush(part)
+        flush(part)
         part.rename(self.folder / JOB)
 
     def _refuse_another(self, job: Mapping[str, str]) -> None:
@@ -263,10 +263,10 @@ class GrowingDataset:
         collected = set(self.collected())
         for sample in self.staged():
             path = self._sample_file(sample)
-            if sample // self.layout.block in collected or not _is_whole(path):
+            if sample // self.layout.block in collected or not is_whole(path):
                 path.unlink()
         for block in collected:
-            if not _is_whole(self._block_file(block)):
+            if not is_whole(self._block_file(block)):
                 self._block_file(block).unlink()
 
 
@@ -385,53 +385,6 @@ def _read_row(store: Path, layout: Layout, sample: int) -> Row:
 def _only(values: np.ndarray) -> np.ndarray:
     """Take the leading dimension away; of texts too, which an index would turn into `str`."""
     return values.reshape(values.shape[1:])
-
-
-def _save(path: Path, row: Row) -> None:
-    """Write arrays aside, flush them to the disk, and give them their name."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    plain: dict[str, Any] = {
-        # NumPy's files know no variable-length strings, and a pickle is read nowhere here.
-        key: np.array(values.tolist(), dtype=np.str_) if values.dtype.kind == "T" else values
-        for key, values in row.items()
-    }
-    try:
-        with part.open("wb") as file:
-            np.savez(file, **plain)
-            file.flush()
-            os.fsync(file.fileno())
-        part.rename(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _load(path: Path, only: tuple[str, ...] | None = None) -> Row:
-    with np.load(path, allow_pickle=False) as held:
-        return {key: held[key] for key in (only or held.files)}
-
-
-def _is_whole(path: Path) -> bool:
-    try:
-        with zipfile.ZipFile(path) as held:
-            return held.testzip() is None
-    except (OSError, zipfile.BadZipFile):
-        return False
-
-
-def _numbers(folder: Path) -> Iterator[int]:
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            stem, _, suffix = entry.name.partition(".")
-            if suffix == "npz" and stem.isdigit():
-                yield int(stem)
-
-
-def _flush(path: Path) -> None:
-    """Have a file, or all below a folder, on the disk before anything says that it is."""
-    for one in [path, *path.rglob("*")] if path.is_dir() else [path]:
-        if one.is_file():
-            with one.open("rb") as file:
-                os.fsync(file.fileno())
 
 
 def _remove(path: Path) -> None:
