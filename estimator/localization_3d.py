@@ -220,7 +220,7 @@ def _images(
     return (
         Image(values=looked.at(points), grid=grid),
         Image(
-            values=corrected_values(looked, points, room.direct, skin=2 * resolution.along_ray),
+            values=corrected_values(looked, points, room.walls, skin=2 * resolution.along_ray),
             grid=grid,
         ),
     )

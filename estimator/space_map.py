@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.ndimage
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Complex, Float
 from scipy.spatial import cKDTree
 
 from estimator.line_search import FALSE_ALARM, Resolution, coarse_resolution
@@ -14,11 +14,23 @@ from estimator.planar_array import PlanarArray, planar_resolution
 from estimator.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.planes import detect_planes, lobe_of_a_wall
 from estimator.projection_3d import PlaneWall, hidden_by, mirrored_about
+from estimator.space_chains import (
+    Chain,
+    chains_in_space,
+    folded_over,
+    image_in_space,
+    seen_over_in_space,
+    unfolded_in_space,
+)
 from estimator.volume_survey import VolumeSurvey, survey_volume
 
 TARGET_LEVEL = 1e-3
 """Intensity, over that of the brightest target, of what still is one. [-]"""
 MOST_TARGETS = 24
+DEEPEST = 3
+"""Walls in a chain over which walls and targets are folded."""
+DEEPEST_IMAGE = 2
+"""The same of the corrected image's voxels."""
 STANDS_OUT = 25.0
 """Intensity over the background's that a target must reach: of pure background one voxel in 1e10
 does. [-]"""
@@ -49,11 +61,6 @@ class SpaceMap:
     targets: tuple[SpaceTarget, ...]  # strongest first
     survey: VolumeSurvey
 
-    @property
-    def direct(self) -> tuple[PlaneWall, ...]:
-        """The walls that are seen directly; they come first."""
-        return tuple(w for w, s in zip(self.walls, self.seen_through, strict=True) if not s)
-
 
 def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     """Find walls and targets in an echo and put them where they really are.
@@ -67,13 +74,12 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     """
     looked = survey_volume(echo, array)
     coarse = coarse_resolution(planar_resolution(array, echo))
-    planes, walls, seen = _folded(detect_planes(echo, array, looked).fitted, coarse)
-    direct = [wall for wall, through in zip(walls, seen, strict=True) if not through]
+    planes, walls, seen = fold_planes(detect_planes(echo, array, looked).fitted, coarse)
     return SpaceMap(
         planes=planes,
         walls=walls,
         seen_through=seen,
-        targets=_targets(echo, array, looked, [plane.wall for plane in planes], direct),
+        targets=_targets(echo, array, looked, [plane.wall for plane in planes], walls),
         survey=looked,
     )
 
@@ -81,14 +87,15 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
 def corrected_values(
     looked: VolumeSurvey,
     points: Float[np.ndarray, "*grid 3"],
-    direct: Sequence[PlaneWall],
+    walls: Sequence[PlaneWall],
     *,
     skin: float,
 ) -> Complex[np.ndarray, "*grid"]:
     """Read the survey on points where things really are.
 
     A point that the array sees directly keeps its value, a hidden one has none; to either comes
-    what the raw image shows at its image in each wall, if the ray there passes the wall.
+    what the raw image shows at its image over each chain of one or two walls, if the line there
+    passes over just these.
 
     Parameters
     ----------
@@ -96,66 +103,64 @@ def corrected_values(
         The survey.
     points
         In the array's frame. [m]
-    direct
-        Walls that are seen directly.
+    walls
+        All mirrors, at their true place.
     skin
         How thick the image of a wall is: so far behind it is still the wall itself. [m]
     """
     flat = points.reshape(-1, 3)
     values = looked.at(flat)
-    for wall in direct:
-        values[_hidden(flat, wall, skin)] = 0.0
-    for index, wall in enumerate(direct):
-        ghosts = mirrored_about(flat, wall)
-        through = _hidden(ghosts, wall, skin)
-        for other in (w for i, w in enumerate(direct) if i != index):
-            through &= ~_before(ghosts, other, wall)
-        values[through] += looked.at(ghosts[through])
+    values[unfolded_in_space(flat, walls, deepest=1, skin=skin)[1][:, 0] >= 0] = 0.0
+    for chain in chains_in_space(len(walls), deepest=DEEPEST_IMAGE):
+        images = image_in_space(flat, walls, chain)
+        seen = seen_over_in_space(images, walls, chain, skin=skin)
+        values[seen] += looked.at(images[seen])
     return values.reshape(points.shape[:-1])
 
 
-def _hidden(
-    points: Float[np.ndarray, "n 3"], wall: PlaneWall, skin: float
-) -> Bool[np.ndarray, " n"]:
-    behind: np.ndarray = (points - wall.centre) @ wall.normal < -skin
-    return np.asarray(behind & hidden_by(points, wall))
-
-
-def _before(
-    points: Float[np.ndarray, "n 3"], wall: PlaneWall, other: PlaneWall
-) -> Bool[np.ndarray, " n"]:
-    """Tell at which points the line of sight meets a wall before it meets another."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        nearer = (wall.centre @ wall.normal) / (points @ wall.normal)
-        farther = (other.centre @ other.normal) / (points @ other.normal)
-    before: np.ndarray = hidden_by(points, wall) & (nearer < farther)
-    return before
-
-
-def _folded(
+def fold_planes(
     planes: Sequence[FittedPlane], resolution: Resolution
 ) -> tuple[tuple[FittedPlane, ...], tuple[PlaneWall, ...], tuple[tuple[int, ...], ...]]:
-    """Fold planes that are seen through others; those seen directly come first."""
+    """Fold planes that are seen through others.
+
+    Parameters
+    ----------
+    planes
+        As the raw image shows them, in the array's frame.
+    resolution
+        Of the image.
+
+    Returns
+    -------
+    The planes that are walls, those seen directly first; their true places; and the walls that
+    each is seen over, from the array outward.
+    """
 
     def behind(plane: FittedPlane, other: FittedPlane) -> bool:
         return plane is not other and bool(hidden_by(plane.wall.centre[None], other.wall)[0])
 
     direct = [a for a in planes if not any(behind(a, b) for b in planes)]
     ordered, walls = list(direct), [plane.wall for plane in direct]
-    seen: list[tuple[int, ...]] = [()] * len(direct)
-    for plane in planes:
-        if any(plane is other for other in direct):
-            continue
-        through = next((i for i, other in enumerate(direct) if behind(plane, other)), None)
-        if through is None:
-            continue  # hidden by a ghost alone: over more mirrors than are folded here
-        folded = mirrored_wall(plane.wall, walls[through])
-        if any(_coincide(folded, wall, resolution) for wall in walls):
-            continue  # a known wall, seen once more
+    seen: list[Chain] = [()] * len(direct)
+    hidden = [plane for plane in planes if not any(plane is other for other in direct)]
+    # A wall that others are seen over is nearer than they are: it is folded before them.
+    for plane in sorted(hidden, key=lambda one: float(np.linalg.norm(one.wall.centre))):
+        chain = _chain_to(plane.wall.centre, walls)
+        folded = plane.wall
+        for index in chain:
+            folded = mirrored_wall(folded, walls[index])
+        if not chain or any(_coincide(folded, wall, resolution) for wall in walls):
+            continue  # hidden by a ghost alone, or a known wall, seen once more
         ordered.append(plane)
         walls.append(folded)
-        seen.append((through,))
+        seen.append(chain)
     return tuple(ordered), tuple(walls), tuple(seen)
+
+
+def _chain_to(place: Float[np.ndarray, " 3"], walls: Sequence[PlaneWall]) -> Chain:
+    """Return the walls over which the array sees a point of its raw image."""
+    chain = unfolded_in_space(place[None], walls, deepest=DEEPEST)[1][0]
+    return tuple(int(index) for index in chain if index >= 0)
 
 
 def mirrored_wall(wall: PlaneWall, mirror: PlaneWall) -> PlaneWall:
@@ -190,7 +195,7 @@ def _targets(
     array: PlanarArray,
     looked: VolumeSurvey,
     planes: Sequence[PlaneWall],
-    direct: Sequence[PlaneWall],
+    walls: Sequence[PlaneWall],
 ) -> tuple[SpaceTarget, ...]:
     """Gather the bright voxels off the walls into clusters and fold those behind walls."""
     resolution = coarse_resolution(planar_resolution(array, echo))
@@ -230,7 +235,7 @@ def _targets(
         members = patches == label
         if lobe_of_a_wall(echo, array, points[members], intensity[members], planes):
             continue
-        target = _target(points[members], intensity[members], direct)
+        target = _target(points[members], intensity[members], walls)
         near = 3 * resolution.across_ray * float(np.linalg.norm(target.position))
         if any(np.linalg.norm(target.position - other.position) < near for other in found):
             continue  # the same once more, seen another way
@@ -241,7 +246,7 @@ def _targets(
 def _target(
     points: Float[np.ndarray, "voxels 3"],
     intensity: Float[np.ndarray, " voxels"],
-    direct: Sequence[PlaneWall],
+    walls: Sequence[PlaneWall],
 ) -> SpaceTarget:
     weights = intensity / intensity.sum()
     ghost = (weights[:, None] * points).sum(axis=0)
@@ -249,21 +254,11 @@ def _target(
     axis = np.linalg.svd(spread * np.sqrt(weights)[:, None], full_matrices=False)[2][0]
     places = spread @ axis
     ends = ghost + np.array([[places.min()], [places.max()]]) * axis
-    position, through = ghost, tuple[int, ...]()
-    hiding = [i for i, wall in enumerate(direct) if hidden_by(ghost[None], wall)[0]]
-    if hiding:
-        nearest = min(hiding, key=lambda i: _share(ghost, direct[i]))
-        position, ends = (mirrored_about(p, direct[nearest]) for p in (ghost, ends))
-        through = (nearest,)
+    through = _chain_to(ghost, walls)
     return SpaceTarget(
-        position=position,
+        position=folded_over(ghost, walls, through),
         ghost=ghost,
         seen_through=through,
         level=float(intensity.max()),
-        ends=ends,
+        ends=folded_over(ends, walls, through),
     )
-
-
-def _share(point: Float[np.ndarray, " 3"], wall: PlaneWall) -> float:
-    """Part of the way to a point at which it passes a wall's plane."""
-    return float(wall.centre @ wall.normal) / float(point @ wall.normal)
