@@ -262,8 +262,7 @@ def _fitted(
             continue
         if line.length < LEAST_CELLS * float(resolution.cell(line.middle, line.direction)):
             continue
-        uncertain = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
-        if np.any(uncertain > MOST_UNCERTAIN * float(resolution.cell(line.middle, line.normal))):
+        if _is_uncertain(line, resolution):
             continue
         if _is_of_waves(line, looked, coarse):
             lines.append(line)
@@ -291,6 +290,12 @@ def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine
     return kept
 
 
+def _is_uncertain(line: FittedLine, resolution: Resolution) -> bool:
+    deviations = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
+    cell = float(resolution.cell(line.middle, line.normal))
+    return bool(np.any(deviations > MOST_UNCERTAIN * cell))
+
+
 def _cut_where_they_cross(
     lines: Sequence[FittedLine], resolution: Resolution, plain: Focus, tapered: Focus
 ) -> list[FittedLine]:
@@ -314,7 +319,10 @@ def _cut_where_they_cross(
                 end = meeting
         if start is line.start and end is line.end:
             cut.append(line)
-        elif (shorter := fit_between(plain, tapered, start, end, resolution, trials=1)) is not None:
+            continue
+        shorter = fit_between(plain, tapered, start, end, resolution, trials=1)
+        # What is left may be too little for a line: speckle then fits at any angle.
+        if shorter is not None and not _is_uncertain(shorter, resolution):
             cut.append(replace(shorter, confidence=line.confidence))
     return cut
 
