@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.line_sampling import SAMPLES_PER_CELL, Focus, cell_along, levels
-from estimator.line_search import GAP, Resolution
+from estimator.line_search import GAP, Resolution, mean_background
 
 CELLS_AT_END = 12.0
 """Cells either side of a wall's rough end that are searched for it."""
@@ -36,7 +36,7 @@ def lit_extent(
     places, points = places[inside], points[inside]
     intensity = np.abs(focus(points)) ** 2
     within = np.abs(places) <= np.linalg.norm(end - start) / 2
-    level = float(np.median(intensity[within])) / np.log(2)
+    level = mean_background(intensity[within])
     background = levels(focus, start, end, resolution)[1]
     # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
     halfway = np.sqrt(level * background)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.line_search import Resolution
+from estimator.line_search import Resolution, mean_background
 from estimator.projection import unit_normal
 
 Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
@@ -83,4 +83,4 @@ def levels(
     intensity = np.abs(focus(points)) ** 2
     on = len(beside) // 2
     around = np.delete(intensity, on, axis=0)
-    return float(intensity[on].mean()), float(np.median(around) / np.log(2))
+    return float(intensity[on].mean()), mean_background(around)

@@ -74,12 +74,12 @@ class Survey:
     bent: Bool[np.ndarray, " peaks"]  # whether they were scattered twice: seen nowhere
     as_point: Float[np.ndarray, " peaks"]  # coherence over the aperture, as that of a point [-]
     as_mirror: Float[np.ndarray, " peaks"]  # the same as that of a mirror facing the array [-]
+    background: float  # mean intensity of what is no echo [-]
 
     @property
     def contrast(self) -> float:
-        """Intensity of the brightest over the mean of what is no echo; 0 of no echo. [-]."""
-        intensity = np.abs(self.values) ** 2
-        return image_contrast(float(intensity.max()), mean_background(intensity))
+        """Intensity of the brightest over the background; 0 of no echo. [-]."""
+        return image_contrast(float(np.max(np.abs(self.values) ** 2)), self.background)
 
 
 def echo_resolution(echo: Echo) -> Resolution:
@@ -140,7 +140,8 @@ def survey(echo: Echo) -> Survey:
     peaks = significant_peaks(np.abs(values) ** 2, points)
     tried = bent_intensities(range_profiles(echo), peaks, resolution)
     # What the noise in the image is before the sum over the positions.
-    noise = mean_background(np.abs(values) ** 2) * taper.sum() ** 2 / (taper**2).sum()
+    background = mean_background(np.abs(values) ** 2)
+    noise = background * taper.sum() ** 2 / (taper**2).sum()
     across = frequency_taper(echo.frequencies, SURVEY_TAPER)
     profiles = range_profiles(echo, weights=across[None, :])
     by_shape = [
@@ -155,6 +156,7 @@ def survey(echo: Echo) -> Survey:
         & ~_faces(peaks, tried[:, 0], by_shape[1], resolution),
         as_point=by_shape[0],
         as_mirror=by_shape[1],
+        background=background,
     )
 
 

@@ -25,6 +25,7 @@ from estimator.angle_range_map import (
     default_path_lengths,
     polar_points,
 )
+from estimator.line_search import mean_background
 from estimator.measurement import MeasurementError, Uplink
 from estimator.spherical_wave_fit import (
     FittedWaves,
@@ -163,7 +164,7 @@ def _strongest(
     """Return the highest power over the mean of noise, and where it is."""
     chart = angle_range_map(left, aoa=angles, path_length=lengths, centre=np.zeros(3))
     power = np.abs(chart.values) ** 2
-    noise = float(np.median(power)) / np.log(2)
+    noise = mean_background(power)
     row, column = np.unravel_index(int(power.argmax()), power.shape)
     start = WaveStart(aoa=float(angles[row]), path_length=float(lengths[column]))
     return float(power[row, column]) / noise, start

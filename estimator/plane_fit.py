@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.special import gammaincc
 
 from estimator.line_sampling import Focus
-from estimator.line_search import DYNAMIC_RANGE, Resolution
+from estimator.line_search import DYNAMIC_RANGE, Resolution, mean_background
 from estimator.projection_3d import PlaneWall, within
 
 SUMMIT = 0.6
@@ -239,7 +239,7 @@ def extent_of_plane(
         return None
     centre = wall.centre + places[seen].mean(axis=0) @ wall.axes
     level = float(stacked[0][seen].mean())
-    beside = float(np.median(stacked[1:, seen]) / np.log(2))
+    beside = mean_background(stacked[1:, seen])
     false = float(gammaincc(area, area * level / max(beside, 1e-300))) * trials
     moved = PlaneWall(
         corners=wall.centre + corners @ wall.axes,

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.projection_3d import STEP, PlaneWall, project_in_space
+from estimator.projection_3d import PlaneWall, central_slopes, project_in_space, slopes_by_wall
 from estimator.space_chains import Chain, chains_in_space, image_in_space, unfolded_in_space
 from estimator.wall_reflection import Reflections, wall_reflections
 
@@ -115,22 +115,9 @@ def _covariance(
     walls: Sequence[PlaneWall],
     chain: Chain,
 ) -> Float[np.ndarray, "3 3"]:
-    steps = np.eye(3) * STEP
-    by_user = np.stack(
-        [
-            _arrival(position + step, walls, chain) - _arrival(position - step, walls, chain)
-            for step in steps
-        ],
-        axis=-1,
-    ) / (2 * STEP)
+    by_user = central_slopes(lambda step: _arrival(position + step, walls, chain))
     total: np.ndarray = by_user @ spread @ by_user.T
     for index in set(chain):
-
-        def moved(step: Float[np.ndarray, " 3"], index: int = index) -> Float[np.ndarray, " 3"]:
-            shifted = [*walls]
-            shifted[index] = walls[index].moved(step)
-            return _arrival(position, shifted, chain)
-
-        by_wall = np.stack([moved(step) - moved(-step) for step in steps], axis=-1) / (2 * STEP)
+        by_wall = slopes_by_wall(lambda moved: _arrival(position, moved, chain), walls, index)
         total = total + by_wall @ walls[index].covariance @ by_wall.T
     return total

@@ -1,6 +1,6 @@
 """Projection in space: launch a ray and fold it at each plane mirror that it meets."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,46 @@ def mirrored_about(points: Float[np.ndarray, "*n 3"], wall: PlaneWall) -> Float[
     height = np.einsum("...x,x->...", points - wall.centre, normal)
     images: np.ndarray = points - 2 * height[..., None] * normal
     return images
+
+
+def folded_over(
+    images: Float[np.ndarray, "*n 3"], walls: Sequence[PlaneWall], chain: Sequence[int]
+) -> Float[np.ndarray, "*n 3"]:
+    """Return where things really are that the raw image shows over a chain of mirrors. [m].
+
+    Parameters
+    ----------
+    images
+        As the array sees them. [m]
+    walls
+        All mirrors, at their true place.
+    chain
+        Their indices, from the array outward.
+    """
+    for index in chain:
+        images = mirrored_about(images, walls[index])
+    return images
+
+
+def central_slopes(
+    value: Callable[[Float[np.ndarray, " 3"]], Float[np.ndarray, " 3"]],
+) -> Float[np.ndarray, "3 3"]:
+    """Return the derivatives of a value at a step of 0 over the step's coordinates."""
+    steps = np.eye(3) * STEP
+    return np.stack([value(step) - value(-step) for step in steps], axis=-1) / (2 * STEP)
+
+
+def slopes_by_wall(
+    value: Callable[[Sequence[PlaneWall]], Float[np.ndarray, " 3"]],
+    walls: Sequence[PlaneWall],
+    index: int,
+) -> Float[np.ndarray, "3 3"]:
+    """Return the derivatives of a value over (tilts, offset) of one of the walls it rests on."""
+
+    def moved(change: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+        return value([*walls[:index], walls[index].moved(change), *walls[index + 1 :]])
+
+    return central_slopes(moved)
 
 
 def within(
@@ -121,23 +161,10 @@ def project_in_space(
     """
     path, met = _trace(cosines, path_length, walls, margin)
     parameters = np.array([*cosines, path_length])
-    by_path = np.stack(
-        [
-            (_end(parameters + step, walls, met) - _end(parameters - step, walls, met)) / (2 * STEP)
-            for step in np.eye(3) * STEP
-        ],
-        axis=-1,
-    )
+    by_path = central_slopes(lambda step: _end(parameters + step, walls, met))
     total = by_path @ covariance @ by_path.T
     for index in set(met):
-        ends = []
-        for step in np.eye(3) * STEP:
-            for sign in (1.0, -1.0):
-                shifted = list(walls)
-                shifted[index] = walls[index].moved(sign * step)
-                ends.append(_end(parameters, shifted, met))
-        by_wall = np.stack([ends[0] - ends[1], ends[2] - ends[3], ends[4] - ends[5]], axis=-1)
-        by_wall = by_wall / (2 * STEP)
+        by_wall = slopes_by_wall(lambda moved: _end(parameters, moved, met), walls, index)
         total = total + by_wall @ walls[index].covariance @ by_wall.T
     return SpaceProjection(position=path[-1], covariance=total, walls=tuple(met), path=path)
 
@@ -181,7 +208,5 @@ def _end(
     parameters: Float[np.ndarray, " 3"], walls: Sequence[PlaneWall], chain: Sequence[int]
 ) -> Float[np.ndarray, " 3"]:
     """End of the path over a given chain of mirrors, whatever their extent."""
-    end = parameters[2] * _towards(parameters[:2])
-    for index in chain:  # the images of later walls, as the array sees them, fold back in turn
-        end = mirrored_about(end, walls[index])
-    return np.asarray(end)
+    # The images of later walls, as the array sees them, fold back in turn.
+    return folded_over(parameters[2] * _towards(parameters[:2]), walls, chain)

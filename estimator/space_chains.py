@@ -10,7 +10,7 @@ from itertools import pairwise, product
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from estimator.projection_3d import GRAZING, PlaneWall, mirrored_about, within
+from estimator.projection_3d import GRAZING, PlaneWall, folded_over, within
 
 Chain = tuple[int, ...]
 """Indices of walls, from the array outward."""
@@ -117,18 +117,7 @@ def image_in_space(
     points: Float[np.ndarray, "*n 3"], walls: Sequence[PlaneWall], chain: Chain
 ) -> Float[np.ndarray, "*n 3"]:
     """Return where the raw image shows points that are seen over a chain. [m]."""
-    for index in reversed(chain):
-        points = mirrored_about(points, walls[index])
-    return points
-
-
-def folded_over(
-    images: Float[np.ndarray, "*n 3"], walls: Sequence[PlaneWall], chain: Chain
-) -> Float[np.ndarray, "*n 3"]:
-    """Return where things really are that the raw image shows over a chain. [m]."""
-    for index in chain:
-        images = mirrored_about(images, walls[index])
-    return images
+    return folded_over(points, walls, chain[::-1])  # mirroring undoes itself
 
 
 def chains_in_space(walls: int, *, deepest: int) -> Iterator[Chain]:

@@ -13,11 +13,10 @@ from estimator.measurement import Echo
 from estimator.planar_array import PlanarArray, planar_resolution
 from estimator.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.planes import detect_planes, lobe_of_a_wall
-from estimator.projection_3d import PlaneWall, hidden_by, mirrored_about
+from estimator.projection_3d import PlaneWall, folded_over, hidden_by, mirrored_about
 from estimator.space_chains import (
     Chain,
     chains_in_space,
-    folded_over,
     image_in_space,
     seen_over_in_space,
     unfolded_in_space,

@@ -10,7 +10,7 @@ from scipy.ndimage import label
 from estimator.diffuse_cloud import between, in_cloud
 from estimator.estimate import Target
 from estimator.line_relations import lies_on
-from estimator.line_search import Resolution, coarse_resolution
+from estimator.line_search import Resolution, coarse_resolution, mean_background
 from estimator.mirror_chains import image_over, possible_chains, seen_over, unfolded
 from estimator.mirror_fit import FittedLine
 from estimator.mirrors import Survey
@@ -92,8 +92,7 @@ def find_targets(
     """
     coarse = coarse_resolution(resolution)
     intensity = np.abs(looked.values) ** 2
-    noise = float(np.median(intensity)) / np.log(2)
-    threshold = noise * np.log(intensity.size / FALSE_TARGETS)
+    threshold = looked.background * np.log(intensity.size / FALSE_TARGETS)
     coherent = np.maximum(looked.as_point, looked.as_mirror)
     seen = ~looked.bent & (coherent >= LEAST_COHERENCE)
     spots = [
@@ -143,7 +142,7 @@ def _spot(
     inside = row - low[0], column - low[1]
     parts = label(window > REGION * window[inside], structure=np.ones((3, 3)))[0]
     region = parts == parts[inside]
-    background = float(np.median(window[~region])) / np.log(2) if not region.all() else np.inf
+    background = mean_background(window[~region]) if not region.all() else np.inf
     far = ranges[row] + (ranges[1] - ranges[0]) * _vertex(intensity[:, column], row)
     sine = sines[column] + (sines[1] - sines[0]) * _vertex(intensity[row], column)
     ends = None

@@ -95,6 +95,21 @@ def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[P
                 parent.rmdir()
 
 
+def refuse_to_replace_input(folder: Path, path: Path) -> None:
+    """Refuse a folder for results that what they are made of lies in.
+
+    Raises
+    ------
+    OutputError
+        If it does.
+    """
+    if path.resolve().is_relative_to(folder.resolve()):
+        raise OutputError(
+            f"{folder} holds the measurement {path} itself, which would be replaced; "
+            "choose another folder with --out"
+        )
+
+
 def refuse_foreign_results(folder: Path) -> str | None:
     """Say why a folder may not be replaced by new results; None if an earlier run made it."""
     return _refuse_foreign(

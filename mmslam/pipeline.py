@@ -100,11 +100,7 @@ def locate_measurement(
     """
     measurement = read_measurement(path, sample=sample)
     folder = folder or default_folder(measurement, path, sample)
-    if path.resolve().is_relative_to(folder.resolve()):
-        raise output.OutputError(
-            f"{folder} holds the measurement {path} itself, which would be replaced; "
-            "choose another folder with --out"
-        )
+    output.refuse_to_replace_input(folder, path)
     with output.replacing(folder, output.refuse_foreign_results) as new:
         new.mkdir()
         estimate = locate(measurement, progress=progress)

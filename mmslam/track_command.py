@@ -56,11 +56,7 @@ def track_to_folder(
     """
     acceleration = ACCELERATION if acceleration is None else acceleration
     folder = folder or Path("out") / f"{path.stem}-track"
-    if path.resolve().is_relative_to(folder.resolve()):
-        raise output.OutputError(
-            f"{folder} holds the measurements {path} themselves, which would be replaced; "
-            "choose another folder with --out"
-        )
+    output.refuse_to_replace_input(folder, path)
     with output.replacing(folder, output.refuse_foreign_track) as new:
         new.mkdir()
         rooms: list[tuple[Mirror, ...]] = []

@@ -8,6 +8,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement import Echo
+from estimator.volume_survey import VolumeSurvey
 
 BAND = np.linspace(220e9, 295e9, 251)  # 0.5 m of unambiguous echo range, 1 m of path
 
@@ -85,6 +86,27 @@ def pilot_of_point(
     return np.asarray(wavelengths / (4 * np.pi * distances) * phase)
 
 
+def volume_of_a_blob(
+    place: Float[np.ndarray, " 3"], width: float, ranges: Float[np.ndarray, " ranges"]
+) -> VolumeSurvey:
+    """A volume within 0.4 of broadside that shows one Gaussian blob of this width, and no noise."""
+    cosines = np.linspace(-0.4, 0.4, 81)
+    axes = np.meshgrid(ranges, cosines, cosines, indexing="ij")
+    ahead = np.sqrt(1 - axes[1] ** 2 - axes[2] ** 2)
+    points = axes[0][..., None] * np.stack([axes[1], ahead, axes[2]], axis=-1)
+    spread = np.linalg.norm(points - place, axis=-1)
+    return VolumeSurvey(
+        values=np.exp(-((spread / width) ** 2)).astype(np.complex128),
+        ranges=ranges,
+        along=cosines,
+        up=cosines,
+        carrier=0.0,
+        background=1e-9,
+        peaks=place[None],
+        lobes=np.zeros((0, 3)),
+    )
+
+
 class World:
     """What the tests of the estimator measure."""
 
@@ -94,6 +116,7 @@ class World:
     noisy: Callable[..., Complex[np.ndarray, "channels freqs"]] = staticmethod(noisy)
     echo: Callable[..., Echo] = staticmethod(echo_of_points)
     pilot: Callable[..., Complex[np.ndarray, "positions freqs"]] = staticmethod(pilot_of_point)
+    volume: Callable[..., VolumeSurvey] = staticmethod(volume_of_a_blob)
 
 
 @pytest.fixture(scope="session")

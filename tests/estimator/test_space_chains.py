@@ -1,21 +1,21 @@
 """What the array sees over several plane mirrors, against rays that are followed one by one."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from jaxtyping import Float
 
 from estimator.line_search import Resolution
 from estimator.plane_fit import FittedPlane, plane_axes
-from estimator.projection_3d import PlaneWall, mirrored_about, project_in_space
+from estimator.projection_3d import PlaneWall, folded_over, mirrored_about, project_in_space
 from estimator.space_chains import (
     chains_in_space,
-    folded_over,
     image_in_space,
     seen_over_in_space,
     unfolded_in_space,
 )
 from estimator.space_map import corrected_values, fold_planes
-from estimator.volume_survey import VolumeSurvey
 
 
 def square(centre: list[float], normal: list[float], half: float = 0.5) -> PlaneWall:
@@ -76,24 +76,9 @@ def test_an_image_is_seen_over_the_chain_whose_walls_its_line_meets() -> None:
     assert len(list(chains_in_space(3, deepest=2))) == 3 + 6
 
 
-def test_a_ghost_over_two_walls_comes_back_to_its_place_in_the_corrected_image() -> None:
+def test_a_ghost_over_two_walls_comes_back_to_its_place_in_the_corrected_image(world: Any) -> None:
     image = image_in_space(THING, WALLS, (0, 1))
-    ranges = np.linspace(0.3, 5.0, 236)
-    cosines = np.linspace(-0.4, 0.4, 81)
-    axes = np.meshgrid(ranges, cosines, cosines, indexing="ij")
-    ahead = np.sqrt(1 - axes[1] ** 2 - axes[2] ** 2)
-    points = axes[0][..., None] * np.stack([axes[1], ahead, axes[2]], axis=-1)
-    spread = np.linalg.norm(points - image, axis=-1)
-    survey = VolumeSurvey(
-        values=np.exp(-((spread / 0.08) ** 2)).astype(np.complex128),
-        ranges=ranges,
-        along=cosines,
-        up=cosines,
-        carrier=0.0,
-        background=1e-9,
-        peaks=image[None],
-        lobes=np.zeros((0, 3)),
-    )
+    survey = world.volume(image, 0.08, np.linspace(0.3, 5.0, 236))
     halfway = mirrored_about(image, FIRST)  # where folding once would leave it
     places = np.stack([THING, image, halfway])
     folded = np.abs(corrected_values(survey, places, WALLS, skin=0.02))

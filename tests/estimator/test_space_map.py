@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.constants import speed_of_light
@@ -10,7 +12,6 @@ from estimator.planes import wall_of_wave
 from estimator.projection_3d import PlaneWall, mirrored_about
 from estimator.range_gate import gated
 from estimator.space_map import corrected_values, mirrored_wall
-from estimator.volume_survey import VolumeSurvey
 from estimator.wavefront_fit import Wavefront, towards
 
 RESOLUTION = Resolution(along_ray=0.02, across_ray=0.02)
@@ -92,26 +93,11 @@ def test_a_flat_waves_direction_error_tilts_the_wall_about_its_foot() -> None:
     assert at @ wall.covariance @ at == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_ghost_behind_a_wall_moves_in_front_and_the_wall_stays() -> None:
+def test_a_ghost_behind_a_wall_moves_in_front_and_the_wall_stays(world: Any) -> None:
     mirror = square(np.array([0.0, 1.0, 0.0]), np.array([0.3, -1.0, 0.0]), half=0.4)
     true = np.array([0.25, 0.7, 0.0])
     ghost = mirrored_about(true, mirror)
-    ranges = np.linspace(0.2, 2.0, 91)
-    cosines = np.linspace(-0.4, 0.4, 81)
-    axes = np.meshgrid(ranges, cosines, cosines, indexing="ij")
-    ahead = np.sqrt(1 - axes[1] ** 2 - axes[2] ** 2)
-    points = axes[0][..., None] * np.stack([axes[1], ahead, axes[2]], axis=-1)
-    spread = np.linalg.norm(points - ghost, axis=-1)
-    survey = VolumeSurvey(
-        values=np.exp(-((spread / 0.04) ** 2)).astype(np.complex128),
-        ranges=ranges,
-        along=cosines,
-        up=cosines,
-        carrier=0.0,
-        background=1e-9,
-        peaks=ghost[None],
-        lobes=np.zeros((0, 3)),
-    )
+    survey = world.volume(ghost, 0.04, np.linspace(0.2, 2.0, 91))
     places = np.stack([ghost, true])
     raw = np.abs(survey.at(places))
     assert raw[0] > 0.9  # interpolated linearly over half its width

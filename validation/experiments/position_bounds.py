@@ -21,8 +21,8 @@ Not in the thesis, which states no bound. Chosen:
 Claims that are asserted: the rms error is within a factor of 1.5 of the bound from 0 dB upward, in
 every sweep of free space, and below it by no more than trial scatter (four standard deviations of
 an rms dominated by one coordinate); with a rough wall it is within a factor of 1.5 of bound and
-floor together from 0 dB upward if the wall is known, and within 2.5 if it is estimated: two times
-over a wall of 5 µm, whose ends outshine its speckle by 10 dB, one from 20 µm upward.
+floor together from 0 dB upward if the wall is known, and within 2.5 if it is estimated: 2.1 times
+over a wall of 5 µm, about once from 20 µm upward.
 """
 
 import csv
