@@ -37,6 +37,9 @@ class FoldedWalls:
     seen_through: tuple[Chain, ...]
     covariance: Float[np.ndarray, "parameters parameters"]
     """Of all walls' (angle [rad], offset [m]), one wall after the other."""
+    views: tuple[tuple[FittedLine, Wall], ...]
+    """Every line that is seen over mirrors, with its true place: also those that are left out,
+    as another view of a wall."""
 
 
 def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
@@ -56,9 +59,12 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
     kept: list[FittedLine] = []
     walls: list[Wall] = []
     seen: list[Chain] = []
+    views: list[tuple[FittedLine, Wall]] = []
     for line in _from_the_array_outward(lines):
         chain = _chain_before(line, walls)
         folded = _folded(line, walls, chain)
+        if chain:
+            views.append((line, folded))
         if len(chain) == DEEPEST or any(_is_one(line, folded, w, resolution) for w in walls):
             continue
         kept.append(line)
@@ -78,6 +84,7 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
         ),
         seen_through=chains,
         covariance=joint,
+        views=tuple(views),
     )
 
 
@@ -95,11 +102,13 @@ def fold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> Fold
 def _is_mixed(line: FittedLine, folded: FoldedWalls, resolution: Resolution) -> bool:
     """Tell whether most of a line is halfway between another's place and its wall's."""
     points = np.linspace(line.start, line.end, SAMPLES)
-    for other, wall, chain in zip(folded.lines, folded.walls, folded.seen_through, strict=True):
-        if other is line or not chain:
+    for other, wall in folded.views:
+        if other is line:
             continue
-        views = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
-        mixed = [between(points, seen, true, resolution) for seen, true in zip(*views, strict=True)]
+        places = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
+        mixed = [
+            between(points, seen, true, resolution) for seen, true in zip(*places, strict=True)
+        ]
         if np.mean(np.any(mixed, axis=0)) > 0.5:
             return True
     return False

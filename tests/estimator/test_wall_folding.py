@@ -10,7 +10,7 @@ from estimator.line_search import Resolution
 from estimator.mirror_chains import image_over
 from estimator.mirror_fit import FittedLine
 from estimator.projection import Wall, mirrored
-from estimator.wall_folding import fold_lines, place_covariance
+from estimator.wall_folding import fold_lines, fold_seen_lines, place_covariance
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
 DEVIATIONS = np.array([2e-4, 3e-5])  # of angle [rad] and offset [m]
@@ -60,6 +60,27 @@ def test_another_view_of_a_known_wall_is_no_second_one() -> None:
     folded = fold_lines([line(FIRST), line(inside), again], RESOLUTION)
     assert len(folded.walls) == 2
     assert folded.seen_through == ((), ())
+
+
+@pytest.mark.parametrize("direct", ["seen", "not seen"])
+def test_what_goes_out_over_a_mirror_and_comes_back_directly_is_no_wall(direct: str) -> None:
+    inside = np.array([[0.45, 0.5, 0.0], [0.45, 0.75, 0.0]])  # seen directly and over the first
+    over = image_over(inside, TRUE, (0,))
+    # Half of its way and the mean of its directions' sines, for either end of the wall.
+    ways = np.linalg.norm(np.stack([inside, over]), axis=-1)
+    ranges = ways.mean(axis=0)
+    sines = (np.stack([inside, over])[..., 0] / ways).mean(axis=0)
+    halfway = np.stack([ranges * sines, ranges * np.sqrt(1 - sines**2), np.zeros(2)], axis=-1)
+    lines = [line(FIRST), line(over), line(halfway, level=0.5)]
+    if direct == "seen":
+        lines.append(line(inside, level=0.5))
+    folded = fold_seen_lines(lines, RESOLUTION)
+    assert len(folded.walls) == 2
+    np.testing.assert_allclose(folded.walls[0].start, FIRST[0])
+    np.testing.assert_allclose(folded.walls[1].start, inside[0], atol=1e-12)
+    # A wall just beside that place stays.
+    stays = halfway + np.array([0.08, 0.0, 0.0])
+    assert len(fold_seen_lines([*lines, line(stays)], RESOLUTION).walls) == 3
 
 
 def test_a_line_beside_a_mirror_is_seen_directly() -> None:
