@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.backprojection import prepare
-from estimator.coherent_line_fit import fit_coherently
+from estimator.coherent_line_fit import CoherentLine, fit_coherently
 from estimator.line_relations import lies_on
 from estimator.line_sampling import Focus
 from estimator.line_search import Resolution, coarse_resolution
@@ -28,6 +28,12 @@ MOST_BESIDE = 12
 """Things brighter than a wall that are told apart from its echo; weaker ones do not pull it."""
 CUT_SHARE = 0.3
 """Part of its length by which a wall may go on where the unambiguous range ends. [-]"""
+
+MOST_DEVIATIONS = 7.0
+"""Deviations of the image's line, of its tilt and its offset together, beyond which the row explains
+something else. Of 118 lines in 33 rooms the echo moved eight by 9 to 13, all in right-angled corners,
+where what is reflected by both walls comes from the ranges of each wall's own echo; all moved away
+from the truth, by 0.1° to 0.4°. The others moved by 5.3 at most, mostly towards it. [-]"""
 
 
 def refine_by_echo(
@@ -104,6 +110,13 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
         beyond=(beyond[0], beyond[1]),
         others=others.reshape(-1, 3),
     )
-    if found is None:
+    if found is None or _deviations(line, found) > MOST_DEVIATIONS:
         return line
     return replace(line, start=found.start, end=found.end, covariance=found.covariance)
+
+
+def _deviations(line: FittedLine, moved: CoherentLine) -> float:
+    """Return how far a line was moved, in its own deviations of tilt and offset."""
+    starts, ends = (moved.start - line.start) @ line.normal, (moved.end - line.end) @ line.normal
+    change = np.array([(ends - starts) / line.length, 0.5 * (starts + ends)])
+    return float(np.sqrt(change**2 @ (1 / np.diag(line.covariance))))
