@@ -30,10 +30,11 @@ CUT_SHARE = 0.3
 """Part of its length by which a wall may go on where the unambiguous range ends. [-]"""
 
 MOST_DEVIATIONS = 7.0
-"""Deviations of the image's line, of its tilt and its offset together, beyond which the row explains
-something else. Of 118 lines in 33 rooms the echo moved eight by 9 to 13, all in right-angled corners,
-where what is reflected by both walls comes from the ranges of each wall's own echo; all moved away
-from the truth, by 0.1° to 0.4°. The others moved by 5.3 at most, mostly towards it. [-]"""
+"""Deviations of the image's line, of its tilt and its offset together, beyond which the row
+explains something else. Of 118 lines in 33 rooms the echo moved eight by 9 to 13, all in
+right-angled corners, where what both walls reflect comes from the ranges of each wall's own echo;
+all moved away from the truth, by 0.1° to 0.4°. The others moved by 5.3 at most, mostly towards
+it. [-]"""
 
 
 def refine_by_echo(

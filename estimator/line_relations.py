@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from estimator.line_search import Resolution
 from estimator.mirror_fit import FittedLine
-from estimator.projection import crossing
+from estimator.projection import crossing, mirrored
 
 EDGE_DEVIATIONS = 3.0
 """Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
@@ -46,6 +46,38 @@ def is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
     points = np.linspace(line.start, line.end, 9)
     before = [other for other in others if other is not line]
     return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
+
+
+def seen_twice(
+    doubtful: Sequence[FittedLine], known: Sequence[FittedLine], resolution: Resolution
+) -> list[FittedLine]:
+    """Return the doubtful lines that are seen directly and, mirrored, over a known wall.
+
+    Neither clouds nor ambiguities have an image just where a wall would show it.
+
+    Parameters
+    ----------
+    doubtful
+        Lines of the image.
+    known
+        Walls; what is behind one may be an image.
+    resolution
+        Of the image.
+    """
+    either = [*known, *doubtful]
+    twice: set[int] = set()
+    for i, image in enumerate(either):
+        for mirror in known:
+            if image is mirror or not hides(mirror, image.middle):
+                continue
+            ends = mirrored(np.stack([image.start, image.end]), mirror.start, mirror.end)
+            points = np.linspace(ends[0], ends[1], 9)
+            for j, wall in enumerate(either):
+                if wall is image or wall is mirror or hides(mirror, wall.middle):
+                    continue
+                if np.mean([lies_on(point, wall, resolution) for point in points]) > 0.5:
+                    twice |= {i, j}
+    return [either[i] for i in sorted(twice) if i >= len(known)]
 
 
 def is_edge_on(line: FittedLine, half: float) -> bool:

@@ -15,6 +15,7 @@ from estimator.line_relations import (
     is_hidden,
     lies_on,
     overlap,
+    seen_twice,
 )
 from estimator.line_sampling import Focus
 from estimator.line_search import (
@@ -207,11 +208,8 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         for weights in (None, survey_weights(echo))
     )
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
-    lines = [
-        line
-        for line in _best_of(_fitted(echo, looked, candidates, plain, tapered), coarse)
-        if not is_edge_on(line, half)
-    ]
+    certain, doubtful = _fitted(echo, looked, candidates, plain, tapered)
+    lines = [line for line in _best_of(certain, coarse) if not is_edge_on(line, half)]
     lines = _cut_where_they_cross(lines, echo_resolution(echo), plain, tapered)
     in_sight = [line for line in lines if not is_hidden(line, lines)]
     # Behind a mirror are clouds as well: there only what is seen, not scattered twice, counts.
@@ -224,7 +222,17 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         dtype=bool,
     )
     ghosts = find_lines(looked.peaks[one_wave & ~looked.bent & behind], coarse)
-    for line in _best_of(_fitted(echo, looked, ghosts, plain, tapered), coarse):
+    certain, more = _fitted(echo, looked, ghosts, plain, tapered)
+    # What the peaks leave in doubt, an image of it over a wall proves.
+    proved = seen_twice(_best_of([*doubtful, *more], coarse), in_sight, echo_resolution(echo))
+    in_sight += [
+        line
+        for line in proved
+        if not is_hidden(line, in_sight)
+        and not is_edge_on(line, half)
+        and not any(overlap(line, known, coarse) for known in in_sight)
+    ]
+    for line in _best_of([*certain, *proved], coarse):
         if any(overlap(line, known, coarse) for known in in_sight):
             continue
         if is_hidden(line, in_sight) and not is_edge_on(line, half):
@@ -238,13 +246,19 @@ def _fitted(
     candidates: Sequence[LineCandidate],
     plain: Focus,
     tapered: Focus,
-) -> list[FittedLine]:
-    """Fit candidates that are no part of a line that was fitted; keep walls that are certain."""
+) -> tuple[list[FittedLine], list[FittedLine]]:
+    """Fit candidates that are no part of a line that was fitted.
+
+    Returns
+    -------
+    Walls that are certain, and lines whose peaks leave it in doubt whether they are walls.
+    """
     resolution = echo_resolution(echo)
     coarse = coarse_resolution(resolution)
     reach = echo_reach(echo)
     trials = looked.values.shape[0] * looked.values.shape[1]
     lines: list[FittedLine] = []
+    doubtful: list[FittedLine] = []
     for candidate in candidates:
         ends = candidate.start, candidate.end
         if any(all(lies_on(end, line, coarse, margin=4.0) for end in ends) for line in lines):
@@ -266,9 +280,8 @@ def _fitted(
             continue
         if _is_uncertain(line, resolution):
             continue
-        if _is_of_waves(line, looked, coarse):
-            lines.append(line)
-    return lines
+        (lines if _is_of_waves(line, looked, coarse) else doubtful).append(line)
+    return lines, doubtful
 
 
 def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:

@@ -11,7 +11,7 @@ farther away than 0.5 m of echo or 1 m of path are unambiguous), walls 0.4 m awa
 Claims that are asserted, for every trap and seed: no answer that is called ``found`` has the
 truth outside its 99.9 % region (χ² with two degrees of freedom), and no mirror that is reported
 with a confidence above 0.99 is false. A mirror is false if a good part of it is on no wall, or
-if it is turned away from the wall that it lies on.
+if it is turned away from the wall that it lies on, by more than its stated deviation allows.
 """
 
 import sys
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from estimator.estimate import Estimate, Mirror, UserEstimate
 from estimator.localization import locate
@@ -41,7 +41,10 @@ ON_WALL = 0.01
 SHARE_ON_WALL = 0.8
 """Share of a mirror that must be on true walls: its ends are known to some cells only. [-]"""
 TURNED = np.radians(1.0)
-"""Angle from the wall beyond which a mirror is false: it moves a user 0.5 m away by 2 cm. [rad]"""
+"""Angle from a wall beyond which a mirror may be false: at 0.5 m it moves a user by 2 cm. [rad]"""
+DEVIATIONS = float(norm.isf(0.0005))
+"""Deviations of its angle that a mirror must be turned by as well: outside its 99.9 % interval. A
+wall of some 20 cells, such as the one of 7 cm, is known to 1° only, and says so. [-]"""
 
 HALF_SIZE = (
     "base_station.elements=128",
@@ -373,7 +376,8 @@ def _seen(mirror: Mirror, truth: Truth) -> SeenMirror:
         for one in truth.wall_start
     ]
     on_walls = np.mean(np.min(distances, axis=0) < ON_WALL)
-    right = on_walls >= SHARE_ON_WALL and nearest.angle < TURNED
+    known_to = DEVIATIONS * float(np.sqrt(mirror.covariance[0, 0]))
+    right = on_walls >= SHARE_ON_WALL and nearest.angle < max(TURNED, known_to)
     return SeenMirror(
         wall=name if right else None,
         angle=nearest.angle,
