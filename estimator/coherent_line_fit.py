@@ -28,7 +28,9 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.blas import zherk
 
+from estimator.dirichlet_profiles import Sweep, point_profiles
 from estimator.measurement import Echo, frequency_step
 from estimator.projection import unit_normal
 
@@ -113,26 +115,27 @@ def fit_coherently(
     levers = 2 * places / length
     thinned = _thinned(echo, start, end)
     profiles = _profiles(thinned, start, end)
-    beside = None if others is None or len(others) == 0 else _echoes(thinned, profiles, others)[0]
+    normal = unit_normal(start, end)
+    beside = None
+    if others is not None and len(others):
+        beside = _echoes(thinned, profiles, others, normal)[0]
     data = profiles.values.ravel()
     first = (start, end)
     for _ in range(STEPS):
         along = (end - start) / length
         row = 0.5 * (start + end) + places[:, None] * along
-        echoes, by_range = _echoes(thinned, profiles, row)
-        closing = _range_slopes(thinned, row, unit_normal(start, end))
-        slopes = by_range * np.repeat(closing, len(profiles.ranges), axis=0)
+        echoes, slopes = _echoes(thinned, profiles, row, unit_normal(start, end))
         if beside is not None:
             echoes = np.concatenate([echoes, beside], axis=1)
-        adjoint = echoes.conj().T
-        gram = adjoint @ echoes
+        # Only the lower triangle, which is all that the factorization reads.
+        gram = zherk(1.0, echoes.T, lower=1).conj()
         gram[np.diag_indices(len(gram))] += RIDGE * np.trace(gram).real / len(gram)
-        solved = cho_factor(gram, lower=True)
-        all_strengths = cho_solve(solved, adjoint @ data)
+        solved = cho_factor(gram, lower=True, overwrite_a=True)
+        all_strengths = cho_solve(solved, _adjoint(echoes, data))
         left = data - echoes @ all_strengths
         strengths = all_strengths[:count]
-        moved = np.stack([slopes @ strengths, slopes @ (strengths * levers)], axis=-1)
-        moved -= echoes @ cho_solve(solved, adjoint @ moved)
+        moved = slopes @ np.stack([strengths, strengths * levers], axis=-1)
+        moved -= echoes @ cho_solve(solved, _adjoint(echoes, moved))
         stiffness = (moved.conj().T @ moved).real
         step = np.linalg.solve(stiffness, (moved.conj().T @ left).real)
         start, end = _moved(start, end, step)
@@ -140,7 +143,7 @@ def fit_coherently(
             FARTHEST_STEP * cell_across
         ):
             return None
-    pushes = ((slopes * strengths).conj().T @ left).real
+    pushes = (strengths.conj() * _adjoint(slopes, left)).real
     columns = np.sqrt(_slow_share(pushes, levers)) * np.stack([pushes, pushes * levers])
     softness = np.linalg.inv(stiffness)
     # Of (offset, displacement of the ends), whatever each place's own variance is.
@@ -150,6 +153,13 @@ def fit_coherently(
     covariance = to_angle @ by_step @ to_angle.T
     covariance[1, 1] += DEPTH**2
     return CoherentLine(start=start, end=end, covariance=covariance)
+
+
+def _adjoint(
+    matrix: Complex[np.ndarray, "rows columns"], values: Complex[np.ndarray, "rows *some"]
+) -> Complex[np.ndarray, "columns *some"]:
+    """Multiply the conjugate transpose of a large matrix, without a copy of it."""
+    return np.asarray((matrix.T @ values.conj()).conj())
 
 
 def _slow_share(
@@ -205,8 +215,7 @@ def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, 
     points = np.linspace(start, end, 129) - echo.positions.mean(axis=0)
     ranges = np.linalg.norm(points, axis=-1)
     sines = points[:, 0] / ranges
-    _, step, count = _sweep(echo)
-    near = SAME_RANGE * speed_of_light / (2 * count * step)
+    near = SAME_RANGE * _sweep(echo).bin_width
     together = np.abs(ranges[:, None] - ranges) < near
     span = float(np.max(np.abs(sines[:, None] - sines) * together))
     wavelength = speed_of_light / float(echo.frequencies[-1])
@@ -248,49 +257,33 @@ def _range_slopes(
     return np.asarray(0.5 * (back + out))
 
 
-def _sweep(echo: Echo) -> tuple[float, float, int]:
-    """Return the band's centre, its step, and the number of frequencies."""
-    count = len(echo.frequencies)
-    step = frequency_step(echo.frequencies)
-    return float(echo.frequencies[0]) + 0.5 * (count - 1) * step, step, count
+def _sweep(echo: Echo) -> Sweep:
+    step, count = frequency_step(echo.frequencies), len(echo.frequencies)
+    centre = float(echo.frequencies[0]) + 0.5 * (count - 1) * step
+    return Sweep(centre=centre, step=step, count=count)
 
 
 def _profiles(
     echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
 ) -> _Profiles:
     """Range profiles around the wall, at the sweep's own independent ranges."""
-    centre, step, count = _sweep(echo)
-    bin_width = speed_of_light / (2 * count * step)
+    sweep = _sweep(echo)
     ranges = _ranges(echo, np.linspace(start, end, 33))
-    low = int(np.floor(ranges.min() / bin_width)) - RANGE_MARGIN
-    high = int(np.ceil(ranges.max() / bin_width)) + RANGE_MARGIN
-    bins = np.arange(low, min(high, low + count - 1) + 1) * bin_width
-    offsets = echo.frequencies - centre
-    turns = np.exp(4j * np.pi / speed_of_light * np.outer(offsets, bins)) / np.sqrt(count)
+    low = int(np.floor(ranges.min() / sweep.bin_width)) - RANGE_MARGIN
+    high = int(np.ceil(ranges.max() / sweep.bin_width)) + RANGE_MARGIN
+    bins = np.arange(low, min(high, low + sweep.count - 1) + 1) * sweep.bin_width
+    offsets = echo.frequencies - sweep.centre
+    turns = np.exp(4j * np.pi / speed_of_light * np.outer(offsets, bins)) / np.sqrt(sweep.count)
     return _Profiles(values=echo.samples @ turns, ranges=bins)
 
 
 def _echoes(
-    echo: Echo, profiles: _Profiles, points: Float[np.ndarray, "points 3"]
+    echo: Echo,
+    profiles: _Profiles,
+    points: Float[np.ndarray, "points 3"],
+    normal: Float[np.ndarray, " 3"],
 ) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
-    """Return each scatterer's range profiles, and their slopes over its range [1/m]."""
-    centre, step, count = _sweep(echo)
-    ranges = _ranges(echo, points)
-    # Dirichlet's kernel about the band's centre is real: the sum over the sweep's frequencies,
-    # sin(Nx)/sin(x). Bins are π/N apart in x, so that N times as much needs no sine of each bin.
-    per_range = 2 * np.pi * step / speed_of_light
-    bins, way = per_range * profiles.ranges[:, None], (per_range * ranges)[:, None, :]
-    sine = np.sin(bins) * np.cos(way) - np.cos(bins) * np.sin(way)
-    cosine = np.cos(bins) * np.cos(way) + np.sin(bins) * np.sin(way)
-    turned = np.cos(count * bins)  # 1 or -1 where the bins are the sweep's own
-    on_bin = np.abs(sine) < 1e-7
-    sine[on_bin] = 1.0
-    kernel = -turned * np.sin(count * way) / sine
-    kernel[on_bin] = count
-    slope = (turned * np.cos(count * way) * count - kernel * cosine) / sine * per_range
-    slope[on_bin] = 0.0
-    wavenumber = 4 * np.pi * centre / speed_of_light
-    carrier = np.exp(-1j * wavenumber * ranges)[:, None, :] / np.sqrt(count)
-    rows = -1, len(points)
-    by_range = (-slope - 1j * wavenumber * kernel) * carrier
-    return (kernel * carrier).reshape(rows), by_range.reshape(rows)
+    """Return each scatterer's range profiles, and how they change along a normal [1/m]."""
+    return point_profiles(
+        _sweep(echo), profiles.ranges, _ranges(echo, points), _range_slopes(echo, points, normal)
+    )

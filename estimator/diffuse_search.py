@@ -23,11 +23,12 @@ distances are the same as for their mirror images.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
-from scipy.ndimage import map_coordinates, maximum_filter1d
+from scipy.ndimage import map_coordinates, maximum_filter1d, spline_filter
 
 from estimator.measurement import Uplink
 from estimator.projection import Wall
@@ -99,6 +100,11 @@ class _Anchors:
     def farthest(self) -> float:
         """Largest distance that is told apart. [m]."""
         return float(self.step * self.scores.shape[1])
+
+    @cached_property
+    def splines(self) -> Float[np.ndarray, "points distances"]:
+        """Coefficients of cubic splines through the scores. [-]."""
+        return np.asarray(spline_filter(self.scores, order=3, mode="mirror"))
 
 
 def search_diffuse(uplink: Uplink, walls: Sequence[SeenWall]) -> DiffuseFix | None:
@@ -305,7 +311,9 @@ def _refined(
             return None
         columns = (distance[usable] + shifts) / anchors.step
         rows = np.broadcast_to(usable[:, None], columns.shape)
-        profiles = map_coordinates(anchors.scores, [rows, columns], order=3, mode="nearest")
+        profiles = map_coordinates(
+            anchors.splines, [rows, columns], order=3, mode="mirror", prefilter=False
+        )
         stretches = np.array_split(np.arange(len(usable)), STRETCHES)
         directions = place - anchors.places[usable]
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)

@@ -21,7 +21,11 @@ class Folded:
 
 
 def corrected_image(
-    focus: Focus, points: Float[np.ndarray, "*grid 3"], walls: Sequence[Wall]
+    focus: Focus,
+    points: Float[np.ndarray, "*grid 3"],
+    walls: Sequence[Wall],
+    *,
+    raw: Complex[np.ndarray, "*grid"] | None = None,
 ) -> Folded:
     """Focus the echo on points where things really are.
 
@@ -37,6 +41,8 @@ def corrected_image(
         Points in the array's frame. [m]
     walls
         All mirrors, at their true place.
+    raw
+        What is focused on the points themselves, if that is known already. [-]
     """
     flat = points.reshape(-1, 3)
     values = np.zeros(len(flat), dtype=np.complex128)
@@ -47,7 +53,7 @@ def corrected_image(
         seen = np.flatnonzero(seen_over(images, walls, chain))
         if not seen.size:
             continue
-        shown = focus(images[seen])
+        shown = focus(images[seen]) if chain or raw is None else raw.ravel()[seen]
         brighter = (source[seen] < 0) | (np.abs(shown) > np.abs(values[seen]))
         values[seen[brighter]] = shown[brighter]
         source[seen[brighter]] = len(chains)

@@ -40,28 +40,29 @@ def unfolded(
     The true places [m], and for each point the mirrors on its way, from the array outward,
     filled up with -1.
     """
-    left = np.linalg.norm(points, axis=-1)
-    heading = points / np.maximum(left, np.finfo(float).tiny)[:, None]
-    place = np.zeros_like(points)
+    # A row for each coordinate: of images with millions of points, each is read by itself.
+    left, heading = _rays(points)
+    place = np.zeros_like(heading)
     chains = np.full((len(points), deepest), -1, dtype=np.int64)
     going = np.arange(len(points))
     for bounce in range(deepest):
         if not (walls and going.size):
             break
         before = chains[going, bounce - 1] if bounce else np.full(going.size, -1)
-        distance = np.stack([_crossings(place[going], heading[going], wall) for wall in walls])
+        rays = place[:, going], heading[:, going]
+        distance = np.stack([_crossings(*rays, wall) for wall in walls])
         distance[before[None, :] == np.arange(len(walls))[:, None]] = np.inf
         first = np.argmin(distance, axis=0)
         nearest = distance[first, np.arange(going.size)]
         met = nearest < left[going]
         going, first, nearest = going[met], first[met], nearest[met]
         chains[going, bounce] = first
-        place[going] += nearest[:, None] * heading[going]
+        place[:, going] += nearest * heading[:, going]
         left[going] -= nearest
-        normals = np.stack([wall.normal for wall in walls])[first]
-        turn = np.einsum("px,px->p", heading[going], normals)
-        heading[going] -= 2 * turn[:, None] * normals
-    return place + left[:, None] * heading, chains
+        normals = np.stack([wall.normal for wall in walls], axis=-1)[:, first]
+        turn = np.einsum("xp,xp->p", heading[:, going], normals)
+        heading[:, going] -= 2 * turn * normals
+    return np.ascontiguousarray((place + left * heading).T), chains
 
 
 def image_over(
@@ -115,10 +116,8 @@ def seen_over(
     """Tell which points of the raw image are seen over exactly this chain of mirrors."""
     seen = np.ones(len(images), dtype=bool)
     if chain:  # most points are outside the first mirror: they need not be followed
-        first = walls[chain[0]]
-        heading = images / np.maximum(np.linalg.norm(images, axis=-1), 1e-300)[:, None]
-        reach = _crossings(np.zeros_like(images), heading, first)
-        seen = reach < np.linalg.norm(images, axis=-1)
+        distance, heading = _rays(images)
+        seen = _crossings(np.zeros((3, 1)), heading, walls[chain[0]]) < distance
     deepest = min(len(chain) + 1, DEEPEST)
     met = unfolded(images[seen], walls, deepest=deepest)[1]
     wanted = np.full(deepest, -1)
@@ -127,15 +126,23 @@ def seen_over(
     return seen
 
 
+def _rays(
+    points: Float[np.ndarray, "points 3"],
+) -> tuple[Float[np.ndarray, " points"], Float[np.ndarray, "3 points"]]:
+    """Return the distance of points [m] and the directions to them, a row for each coordinate."""
+    rows = np.ascontiguousarray(points.T)
+    distance = np.sqrt(np.einsum("xp,xp->p", rows, rows))
+    return distance, rows / np.maximum(distance, np.finfo(float).tiny)
+
+
 def _crossings(
-    origins: Float[np.ndarray, "rays 3"], headings: Float[np.ndarray, "rays 3"], wall: Wall
+    origins: Float[np.ndarray, "3 #rays"], headings: Float[np.ndarray, "3 rays"], wall: Wall
 ) -> Float[np.ndarray, " rays"]:
-    """Return the distance at which each ray meets a wall; infinity if it does not. [m]."""
-    normal, along = wall.normal, wall.end - wall.start
-    towards = headings @ normal
+    """Return the distance at which each ray meets an upright wall; infinity if it does not. [m]."""
+    (nx, ny, _), (ax, ay, _) = wall.normal, wall.end - wall.start
+    x, y = origins[0] - wall.start[0], origins[1] - wall.start[1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (wall.start - origins) @ normal / towards
-        meets = origins + distance[:, None] * headings - wall.start
-        share = meets @ along / (along @ along)
-    hit = (distance > GRAZING) & (share >= 0) & (share <= 1)
+        distance = -(x * nx + y * ny) / (headings[0] * nx + headings[1] * ny)
+        share = x * ax + y * ay + distance * (headings[0] * ax + headings[1] * ay)
+    hit = (distance > GRAZING) & (share >= 0) & (share <= ax * ax + ay * ay)
     return np.where(hit, distance, np.inf)

@@ -47,7 +47,7 @@ def room_images(
     grid = _grid(frame.to_world(np.concatenate(shown)), echo_resolution(echo).along_ray)
     points = frame.to_local(grid.points)
     raw = Image(values=focus_in_reach(points), grid=grid)
-    folded = corrected_image(focus_in_reach, points, room.walls)
+    folded = corrected_image(focus_in_reach, points, room.walls, raw=raw.values)
     corrected = CorrectedImage(
         values=folded.values, grid=grid, chains=folded.chains, chain=folded.chain
     )
