@@ -62,8 +62,10 @@ TILT_SHARE, OFFSET_SHARE = 1.3, 0.9
 and 0.5 to 1.3."""
 SUMMIT_SAMPLES_PER_CELL = 4
 """Along the wall; the intensity has twice the image's bandwidth."""
-BRIGHTNESS = 1.5
-"""Power of the magnitude that K sums. [-]"""
+BRIGHTNESS = (1.5, 1.0, 0.5)
+"""Powers of the magnitude that K sums, the first that has a summit near that of J. On a wall that
+fades by tens of decibels, a rough one's few glints rule the first: 1.5 once had its summit 0.7° off
+the wall, one cell away at its ends. [-]"""
 PASSES = 3
 """Times that the paraboloid is fitted about its own summit."""
 FEWEST_PLACES = 4
@@ -159,11 +161,14 @@ def fit_between(
 
     Returns
     -------
-    The line, or ``None`` if it is too short to have an angle.
+    The line, or ``None`` if it is too short to have an angle, or its brightness no summit.
     """
     if places_along(start, end, resolution).size < FEWEST_PLACES:
         return None
-    start, end, covariance = _summit(focus, start, end, resolution)
+    summit = _summit(focus, start, end, resolution)
+    if summit is None:
+        return None
+    start, end, covariance = summit
     level, background = levels(tapered, start, end, resolution)
     cells = np.linalg.norm(end - start) / cell_along(start, end, resolution)
     # The mean of n exponential variables is Gamma distributed; a trial is any line tried.
@@ -209,8 +214,23 @@ def _summit(
     start: Float[np.ndarray, " 3"],
     end: Float[np.ndarray, " 3"],
     resolution: Resolution,
-) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]]:
-    r"""Move the line to the summit of K and return it with the covariance of its place.
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]] | None:
+    """Move the line to the summit of K and return it with the covariance of its place."""
+    for power in BRIGHTNESS:
+        found = _summit_of(focus, start, end, resolution, power)
+        if found is not None:
+            return found
+    return None
+
+
+def _summit_of(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    power: float,
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]] | None:
+    r"""Find the summit of K near a line; ``None`` if it has none there.
 
     K is a sum over places i, :math:`w_i (c_i + g_i x + h_i x^2 / 2)` near the summit. Where the
     gradients :math:`g_i` of all places move the line is told by their smooth modes.
@@ -225,12 +245,19 @@ def _summit(
     unit = np.linspace(-1, 1, TRIALS)
     x, y = (axis.ravel() for axis in np.meshgrid(unit, unit, indexing="ij"))
     basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=-1)
+    gone = np.zeros(2)
     for _ in range(PASSES):
         points = trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
-        brightness = np.abs(focus(points)) ** BRIGHTNESS
+        brightness = np.abs(focus(points)) ** power
         total = np.linalg.lstsq(basis, (brightness @ weights).ravel())[0]
-        bread = np.linalg.inv(total[[3, 4, 4, 5]].reshape(2, 2))
-        tilt, offset = scale * np.clip(-bread @ total[1:3], -1.0, 1.0)
+        hessian = total[[3, 4, 4, 5]].reshape(2, 2)
+        if np.linalg.eigvalsh(hessian)[-1] >= 0:
+            return None
+        step = -np.linalg.solve(hessian, total[1:3])
+        gone += step
+        if np.any(np.abs(gone) > 1):
+            return None
+        tilt, offset = scale * step
         ends = trial_points(
             start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
         )[0, 0]
@@ -239,9 +266,11 @@ def _summit(
     lines = np.stack([np.ones_like(unit), unit, unit**2 / 2], axis=-1)
     _, slopes, curvatures = np.linalg.lstsq(lines, brightness[TRIALS // 2])[0]
     curvature = float(curvatures @ weights)
+    inertia = float(np.sum(weights * curvatures * levers**2))
+    if curvature >= 0 or inertia >= 0:
+        return None
     pushes = slopes - curvatures * float(slopes @ weights) / curvature
     at_rest, tilting = _slow_power(pushes, levers, weights)
-    inertia = float(np.sum(weights * curvatures * levers**2))
     tilt_variance = TILT_SHARE * tilting * np.sum((weights * levers) ** 2) / inertia**2
     offset_variance = OFFSET_SHARE * at_rest * np.sum(weights**2) / curvature**2
     covariance = np.diag([tilt_variance, offset_variance])

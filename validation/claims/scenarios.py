@@ -108,7 +108,7 @@ MOVED = (
 
 def slam(effort: Effort, tell: Tell) -> Finding:
     """Locate the user of ``slam_2d`` where wall and user stand elsewhere."""
-    seeds = 3 if effort == "full" else 1
+    seeds = SEEDS if effort == "full" else 1
     jobs = [(seed, moved) for moved in MOVED for seed in range(seeds)][: None if seeds > 1 else 1]
     runs = []
     for number, (seed, changes) in enumerate(jobs):
