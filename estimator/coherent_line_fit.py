@@ -72,6 +72,7 @@ class CoherentLine:
     start: Float[np.ndarray, " 3"]  # [m]
     end: Float[np.ndarray, " 3"]  # [m]
     covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
+    explained: float  # share of the echo from its ranges that it and the others explain [-]
 
 
 def fit_coherently(
@@ -152,7 +153,8 @@ def fit_coherently(
     to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
     covariance = to_angle @ by_step @ to_angle.T
     covariance[1, 1] += DEPTH**2
-    return CoherentLine(start=start, end=end, covariance=covariance)
+    explained = 1 - float(np.vdot(left, left).real / np.vdot(data, data).real)
+    return CoherentLine(start=start, end=end, covariance=covariance, explained=explained)
 
 
 def _adjoint(

@@ -10,6 +10,7 @@ from estimator.angle_range_map import angle_range_map, default_angles, default_p
 from estimator.array_frame import ArrayFrame, array_frame
 from estimator.diffuse_location import with_diffuse_search
 from estimator.estimate import AngleRangeMap, Estimate, Progress, UserEstimate
+from estimator.line_search import Resolution
 from estimator.localization_3d import locate_in_space
 from estimator.measurement import Echo, Measurement, Uplink, frequency_step
 from estimator.mirrors import echo_reach, echo_resolution, imaged_sine
@@ -20,6 +21,7 @@ from estimator.room_images import room_images
 from estimator.room_map import build_room_map, mirrors_in_world, targets_in_world
 from estimator.user_decision import decide
 
+NO_IMAGE = Resolution(along_ray=0.0, across_ray=0.0)
 CLOSE_UP = 80
 """Samples of the close-up to either side."""
 CLOSE_UP_SAMPLES = 8
@@ -95,7 +97,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             uplink.user,
             find_paths(local, looked, clock_known=clock_known),
             room.walls if room else (),
-            cell=echo_resolution(local_echo).across_ray if local_echo else 0.0,
+            resolution=echo_resolution(local_echo) if local_echo else NO_IMAGE,
             imaged=local_echo is not None,
             loose=room.loose if room else np.zeros((0, 3)),
             wall_covariance=room.joint_covariance if room else None,

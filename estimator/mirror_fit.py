@@ -63,9 +63,11 @@ and 0.5 to 1.3."""
 SUMMIT_SAMPLES_PER_CELL = 4
 """Along the wall; the intensity has twice the image's bandwidth."""
 BRIGHTNESS = (1.5, 1.0, 0.5)
-"""Powers of the magnitude that K sums, the first that has a summit near that of J. On a wall that
-fades by tens of decibels, a rough one's few glints rule the first: 1.5 once had its summit 0.7° off
-the wall, one cell away at its ends. [-]"""
+"""Powers of the magnitude that K sums, the first that has a summit where its slopes lead. On a wall
+that fades by tens of decibels, a rough one's few glints rule the first: it once led 0.7° off the
+wall, downwards. [-]"""
+LEAST_RISE = 0.98
+"""K where the paraboloids led, over K where they began. [-]"""
 PASSES = 3
 """Times that the paraboloid is fitted about its own summit."""
 FEWEST_PLACES = 4
@@ -245,7 +247,12 @@ def _summit_of(
     unit = np.linspace(-1, 1, TRIALS)
     x, y = (axis.ravel() for axis in np.meshgrid(unit, unit, indexing="ij"))
     basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=-1)
-    gone = np.zeros(2)
+
+    def height() -> float:
+        here = trial_points(start, end, places, np.zeros(1), np.zeros(1))[0, 0]
+        return float(np.abs(focus(here)) ** power @ weights)
+
+    first = height()
     for _ in range(PASSES):
         points = trial_points(start, end, places, scale[0] * unit, scale[1] * unit)
         brightness = np.abs(focus(points)) ** power
@@ -253,15 +260,13 @@ def _summit_of(
         hessian = total[[3, 4, 4, 5]].reshape(2, 2)
         if np.linalg.eigvalsh(hessian)[-1] >= 0:
             return None
-        step = -np.linalg.solve(hessian, total[1:3])
-        gone += step
-        if np.any(np.abs(gone) > 1):
-            return None
-        tilt, offset = scale * step
+        tilt, offset = scale * np.clip(-np.linalg.solve(hessian, total[1:3]), -1.0, 1.0)
         ends = trial_points(
             start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
         )[0, 0]
         start, end = ends[0], ends[1]
+    if height() < LEAST_RISE * first:
+        return None  # the paraboloid led off a slope
     # Along the normal alone: a tilt moves the ends farther than a paraboloid describes.
     lines = np.stack([np.ones_like(unit), unit, unit**2 / 2], axis=-1)
     _, slopes, curvatures = np.linalg.lstsq(lines, brightness[TRIALS // 2])[0]

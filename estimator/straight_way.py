@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.estimate import UserEstimate
-from estimator.projection import Wall, crossing, project
+from estimator.line_search import Resolution
+from estimator.projection import Wall, crossing, project, unit_normal
 from estimator.spherical_wave_fit import SphericalWave
 from estimator.surroundings import Surroundings
 
@@ -21,6 +22,9 @@ BESIDE = 2.0
 """Cells beside a ray within which a peak stands on it. [-]."""
 USER_SIZE = 0.05
 """How far before the end of a path the user itself may echo. [m]."""
+PEAK_DEVIATION = 0.5
+"""Of an end's peak along a wall's normal: pixels are 0.75 cells apart, and waves bent by an edge
+come from beside it. [cells]"""
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
@@ -46,7 +50,7 @@ def doubt_straight_way(
     -------
     The answer, or that it is ambiguous and why, with the place over an unseen wall.
     """
-    mirror = unseen_mirror(wave.aoa, wave.path_length, room.loose)
+    mirror = unseen_mirror(wave.aoa, wave.path_length, room.loose, room.resolution)
     if mirror is not None:
         place = project(wave.aoa, wave.path_length, [mirror], covariance=wave.covariance)
         other = replace(
@@ -64,7 +68,9 @@ def doubt_straight_way(
             "to be seen; over such a wall the user is elsewhere",
             other,
         )
-    thing = what_stands_in_the_way(wave.aoa, wave.path_length, room.loose, room.cell)
+    thing = what_stands_in_the_way(
+        wave.aoa, wave.path_length, room.loose, room.resolution.across_ray
+    )
     if thing is not None:
         return _doubted(
             answer,
@@ -116,7 +122,7 @@ def _doubted(answer: UserEstimate, reason: str, *others: UserEstimate) -> UserEs
 
 
 def unseen_mirror(
-    aoa: float, path_length: float, loose: Float[np.ndarray, "peaks 3"]
+    aoa: float, path_length: float, loose: Float[np.ndarray, "peaks 3"], resolution: Resolution
 ) -> Wall | None:
     """Return a wall between two loose points that the ray meets before its end, if there is one.
 
@@ -126,14 +132,28 @@ def unseen_mirror(
         Of the ray from the origin. [rad], [m]
     loose
         Peaks of the image that lie on no wall, strongest first. [m]
+    resolution
+        Of the image: the peaks are known to a part of a cell, and so is the wall.
     """
     points = loose[:LOOSE_PEAKS]
     towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         hit = crossing(np.zeros(3), towards, points[first], points[second])
         if hit is not None and hit[0] < path_length:
-            return Wall(start=points[first], end=points[second], covariance=np.zeros((2, 2)))
+            return _wall_between(points[first], points[second], resolution)
     return None
+
+
+def _wall_between(
+    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
+) -> Wall:
+    """Return the wall whose two ends are peaks, with the covariance of their pixels."""
+    normal, length = unit_normal(start, end), float(np.linalg.norm(end - start))
+    ends = np.stack([start, end])
+    variances = (PEAK_DEVIATION * resolution.cell(ends, normal)) ** 2
+    # The end moving along the normal by δ turns the line by −δ over its length, the start by δ.
+    changes = np.array([[1 / length, -1 / length], [0.5, 0.5]])
+    return Wall(start=start, end=end, covariance=changes * variances @ changes.T)
 
 
 def what_stands_in_the_way(

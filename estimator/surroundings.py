@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from estimator.line_search import Resolution
 from estimator.projection import Wall
 
 
@@ -14,7 +15,7 @@ class Surroundings:
 
     walls: tuple[Wall, ...]  # mirrors at their true place
     wall_covariance: Float[np.ndarray, "parameters parameters"]  # of all walls' (angle, offset)
-    cell: float  # how well the image tells where a wall ends, as an angle [rad]
+    resolution: Resolution  # of the image: how well it tells where a wall ends
     imaged: bool  # whether there was an echo: without, nothing is known of mirrors
     loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
     reach: float  # how far the image shows what there is [m]

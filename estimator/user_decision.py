@@ -16,6 +16,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from estimator.estimate import PathReport, UserEstimate
+from estimator.line_search import Resolution
 from estimator.path_consensus import Consensus, Sighting, block_covariance, solve_position
 from estimator.paths import Path, PathSet
 from estimator.projection import Wall, mirrored, project
@@ -38,7 +39,7 @@ def decide(
     found: PathSet,
     walls: Sequence[Wall],
     *,
-    cell: float,
+    resolution: Resolution,
     imaged: bool,
     loose: Float[np.ndarray, "peaks 3"],
     wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
@@ -57,8 +58,8 @@ def decide(
         Its paths.
     walls
         Mirrors at their true place.
-    cell
-        How well the image tells where a wall ends, as an angle. [rad]
+    resolution
+        Of the image: how well it tells where a wall ends.
     imaged
         Whether there was an echo at all: without, nothing is known of mirrors.
     loose
@@ -87,7 +88,7 @@ def decide(
     room = Surroundings(
         walls=tuple(walls),
         wall_covariance=block_covariance(walls) if wall_covariance is None else wall_covariance,
-        cell=cell,
+        resolution=resolution,
         imaged=imaged,
         loose=loose,
         reach=reach,
@@ -203,10 +204,11 @@ Chains = dict[int, tuple[tuple[int, ...], ...]]
 
 def _chains(length: float, path: Path, room: Surroundings) -> tuple[tuple[int, ...], ...]:
     aoa, covariance = path.wave.aoa, np.zeros((2, 2))
-    deviation = END_DEVIATIONS * float(np.sqrt(path.wave.covariance[0, 0]))
+    reach = room.resolution.across_ray
+    reach += END_DEVIATIONS * float(np.sqrt(path.wave.covariance[0, 0]))
     met = [
         project(aoa + turn, length, room.walls, covariance=covariance).walls
-        for turn in (0.0, room.cell + deviation, -room.cell - deviation)
+        for turn in (0.0, reach, -reach)
     ]
     return tuple(dict.fromkeys(met))
 

@@ -15,13 +15,13 @@ def summed(ranges: Float[np.ndarray, "positions points"]) -> Complex[np.ndarray,
     offsets = (np.arange(SWEEP.count) - (SWEEP.count - 1) / 2) * SWEEP.step
     waves = np.exp(-4j * np.pi / speed_of_light * (offsets[:, None, None] + SWEEP.centre) * ranges)
     turns = np.exp(4j * np.pi / speed_of_light * np.outer(BINS, offsets)) / np.sqrt(SWEEP.count)
-    return np.einsum("bf,fmp->mbp", turns, waves).reshape(-1, ranges.shape[1])
+    return np.asarray(np.einsum("bf,fmp->mbp", turns, waves).reshape(-1, ranges.shape[1]))
 
 
 @pytest.mark.parametrize("where", ["anywhere", "on bins"])
 def test_profiles_and_slopes_are_those_of_the_sum(where: str) -> None:
     rng = np.random.default_rng(1)
-    ranges = rng.uniform(BINS[5], BINS[-5], (3, 7))
+    ranges: np.ndarray = rng.uniform(BINS[5], BINS[-5], (3, 7))
     if where == "on bins":
         ranges = BINS[rng.integers(5, BINS.size - 5, ranges.shape)]
     rates = rng.uniform(-1, 1, ranges.shape)

@@ -269,3 +269,21 @@ def test_a_wall_at_the_end_of_the_unambiguous_range_is_no_error(world: Any) -> N
     )
     for line in found(echo):
         assert angle_of(line) == pytest.approx(70.0, abs=1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_few_glints_at_one_end_do_not_turn_a_wall(seed: int, world: Any) -> None:
+    rng = np.random.default_rng(seed)
+    middle, angle, length = np.array([0.0, 0.28, 0.0]), 35.0, 0.2
+    along = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    whole = world.rough_line((0.0, 0.28), angle, length, rng, rms=0.0)
+    echo = world.echo(whole, rng, snr_db=40.0)
+    samples = echo.samples
+    for _ in range(4):
+        x, y, _ = middle + rng.uniform(-0.5, -0.2) * length * along
+        glint = world.rough_line((x, y), angle, 0.002, rng, rms=0.2e-3, count=30)
+        samples = samples + 10 * world.echo(glint, rng, snr_db=60.0).samples
+    echo = Echo(samples=samples, positions=echo.positions, frequencies=echo.frequencies)
+    (line,) = detect_mirrors(echo, survey(echo))
+    # A cell at its ends would be 0.7°: their sum of powers leads there, or nowhere.
+    assert abs(angle_of(line) - angle) < 0.2

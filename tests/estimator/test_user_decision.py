@@ -9,6 +9,7 @@ from scipy.constants import speed_of_light
 from scipy.linalg import block_diag
 
 from estimator.estimate import UserEstimate
+from estimator.line_search import Resolution
 from estimator.paths import Path, PathSet
 from estimator.projection import Wall
 from estimator.spherical_wave_fit import SphericalWave
@@ -16,7 +17,7 @@ from estimator.user_decision import decide
 
 NOTHING_LOOSE = np.zeros((0, 3))
 ANGLE, LENGTH = 1e-4, 5e-5  # deviations of a wave: 0.1 mrad, 0.05 mm
-CELL = 5e-3  # of the image, as an angle
+RESOLUTION = Resolution(along_ray=2e-3, across_ray=5e-3)
 
 
 def wave(aoa_deg: float, length: float, radius: float) -> SphericalWave:
@@ -83,7 +84,7 @@ def decided(
     imaged: bool = True,
     loose: Float[np.ndarray, "peaks 3"] = NOTHING_LOOSE,
 ) -> UserEstimate:
-    return decide("ann", together(paths), walls, cell=CELL, imaged=imaged, loose=loose)
+    return decide("ann", together(paths), walls, resolution=RESOLUTION, imaged=imaged, loose=loose)
 
 
 def test_a_direct_path_is_the_user() -> None:
@@ -174,6 +175,30 @@ def test_a_second_path_tells_whether_the_first_meets_a_walls_very_end() -> None:
     np.testing.assert_allclose(both.position, user, atol=1e-9)
 
 
+def test_a_place_over_a_wall_between_two_peaks_is_known_as_well_as_they_are() -> None:
+    image = np.array([0.0, 1.5, 0.0])
+    ends = np.array([[-0.1, 0.7, 0.0], [0.1, 0.9, 0.0]])
+    found = decided([direct(image)], [], loose=ends)
+    (other,) = found.alternatives
+    assert other.position is not None
+    assert other.covariance is not None
+    np.testing.assert_allclose(other.position, [0.7, 0.8, 0.0], atol=1e-9)
+    # Half a cell along the normal at either end, at random; what the wave itself is known to is
+    # far less.
+    rng = np.random.default_rng(4)
+    normal = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    cells = RESOLUTION.cell(ends, normal)
+    moved = ends + 0.5 * (cells * rng.standard_normal((2000, 2)))[..., None] * normal
+    along = moved[:, 1] - moved[:, 0]
+    normals = np.stack([along[:, 1], -along[:, 0], 0 * along[:, 0]], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    height = np.einsum("nx,nx->n", image - moved[:, 0], normals)
+    drawn = np.cov((image - 2 * height[:, None] * normals)[:, :2].T)
+    # A covariance of 2000 draws is known to 1/√2000 of the deviations' product, or √2 of it.
+    scale = np.sqrt(np.outer(np.diag(drawn), np.diag(drawn)))
+    np.testing.assert_allclose(other.covariance[:2, :2] / scale, drawn / scale, atol=0.13)
+
+
 def test_something_on_the_straight_way_may_be_a_short_mirror() -> None:
     user = np.array([0.0, 0.9, 0.0])
     post = np.array([[0.001, 0.5, 0.0]])
@@ -198,7 +223,7 @@ def test_an_echo_too_noisy_to_show_walls_leaves_the_straight_way_open(
         "ann",
         together([direct(user)]),
         walls,
-        cell=CELL,
+        resolution=RESOLUTION,
         imaged=True,
         loose=NOTHING_LOOSE,
         contrast=contrast,
@@ -213,7 +238,7 @@ def test_an_echo_too_noisy_to_show_walls_leaves_the_straight_way_open(
 
 def late(paths: list[Path], walls: list[Wall]) -> UserEstimate:
     return decide(
-        "ann", together(paths), walls, cell=CELL, imaged=True, loose=NOTHING_LOOSE,
+        "ann", together(paths), walls, resolution=RESOLUTION, imaged=True, loose=NOTHING_LOOSE,
         clock_known=False,
     )  # fmt: skip
 
