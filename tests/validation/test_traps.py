@@ -2,7 +2,8 @@
 
 import pytest
 
-from validation.experiments.traps import TRAPS, Trial, trial
+from validation.experiments.traps import Trial, trial
+from validation.trap_rooms import TRAPS
 
 FAST = ("edge-on, at the side", "smooth wall", "behind")
 """One each of a mirror, a user and nothing at all that a careless estimator would claim."""

@@ -6,6 +6,7 @@ from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import baselines as others
 from validation.experiments import position_bounds as bounds
 from validation.experiments import traps, uncertainty_calibration
+from validation.trap_rooms import TRAPS
 
 NO_ANSWER = 1e3  # an error that stands for none [m]
 
@@ -158,7 +159,7 @@ def pitfalls(effort: Effort, tell: Tell) -> Finding:
     """Try rooms that mislead: no answer is fine, a confident wrong one is not."""
     wrong: list[str] = []
     answered = 0
-    rooms = list(traps.TRAPS.items())
+    rooms = list(TRAPS.items())
     for number, (name, (scenario, overrides)) in enumerate(rooms):
         result = traps.trial(scenario, overrides, seed=0)
         wrong += [f"{name}: the {what} is wrong" for what in result.wrong]
