@@ -116,10 +116,9 @@ def fit_coherently(
     levers = 2 * places / length
     thinned = _thinned(echo, start, end)
     profiles = _profiles(thinned, start, end)
-    normal = unit_normal(start, end)
     beside = None
     if others is not None and len(others):
-        beside = _echoes(thinned, profiles, others, normal)[0]
+        beside = _echoes(thinned, profiles, others, unit_normal(start, end))[0]
     data = profiles.values.ravel()
     first = (start, end)
     for _ in range(STEPS):

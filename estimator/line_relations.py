@@ -35,10 +35,21 @@ def lies_on(
     return beside < 2 * float(resolution.cell(point, normal)) and along < reach
 
 
+def _share_on(
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    line: FittedLine,
+    resolution: Resolution,
+) -> float:
+    """Return the share of a segment that lies on a line. [-]."""
+    return float(
+        np.mean([lies_on(point, line, resolution) for point in np.linspace(start, end, 9)])
+    )
+
+
 def overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
     """Tell whether a good part of a line lies on another."""
-    points = np.linspace(line.start, line.end, 9)
-    return bool(np.mean([lies_on(point, other, coarse) for point in points]) > 1 / 3)
+    return _share_on(line.start, line.end, other, coarse) > 1 / 3
 
 
 def is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
@@ -71,11 +82,10 @@ def seen_twice(
             if image is mirror or not hides(mirror, image.middle):
                 continue
             ends = mirrored(np.stack([image.start, image.end]), mirror.start, mirror.end)
-            points = np.linspace(ends[0], ends[1], 9)
             for j, wall in enumerate(either):
                 if wall is image or wall is mirror or hides(mirror, wall.middle):
                     continue
-                if np.mean([lies_on(point, wall, resolution) for point in points]) > 0.5:
+                if _share_on(ends[0], ends[1], wall, resolution) > 0.5:
                     twice |= {i, j}
     return [either[i] for i in sorted(twice) if i >= len(known)]
 

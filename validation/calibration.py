@@ -13,6 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import beta, chi2
 
+from estimator.estimate import UserEstimate
+
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
@@ -142,3 +144,17 @@ def _check(trials: int, *, probability: float, confidence: float) -> None:
     for name, value in (("probability", probability), ("confidence", confidence)):
         if not 0 < value < 1:
             raise ValueError(f"{name} = {value:g}; it must lie between 0 and 1")
+
+
+def position_errors(
+    answer: UserEstimate, truth: Float[np.ndarray, " 3"]
+) -> tuple[float | None, float | None]:
+    """Return the error of a position in the plane [m], and its square over its covariance [-].
+
+    Both are ``None`` of an answer without a position or without its covariance.
+    """
+    if answer.position is None or answer.covariance is None:
+        return None, None
+    error = (answer.position - truth)[:2]
+    square = normalised_square(error, answer.covariance[:2, :2])
+    return float(np.linalg.norm(error)), square

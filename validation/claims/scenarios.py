@@ -14,7 +14,7 @@ from estimator.localization import locate
 from estimator.measurement import Measurement
 from scenes.library import load_scenario
 from simulator.simulation import simulate
-from validation.calibration import normalised_square
+from validation.calibration import position_errors
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.figures import draw_localization
 from validation.metrics import ErrorSummary, error_summary, wall_errors
@@ -44,9 +44,9 @@ class Run:
     def user_square(self, user: str) -> float:
         """Return the square of its error over its covariance, infinite without an answer [-]."""
         for found in self.estimate.users:
-            if found.name == user and found.position is not None and found.covariance is not None:
-                error = (found.position - self.truth.user_position[user])[:2]
-                return normalised_square(error, found.covariance[:2, :2])
+            square = position_errors(found, self.truth.user_position[found.name])[1]
+            if found.name == user and square is not None:
+                return square
         return float("inf")
 
 

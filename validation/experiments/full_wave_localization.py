@@ -43,6 +43,7 @@ from scenes.shapes import object_surface
 from simulator.receiver import received
 from simulator.simulation import simulate
 from simulator.truth import scenario_truth
+from validation.calibration import position_errors
 from validation.full_wave_band import band_fields
 from validation.line_source import LineSource
 from validation.metrics import wall_error
@@ -170,18 +171,19 @@ def located(measurement: Measurement, truth: Truth) -> Located:
     """Locate the user and compare user and wall with the truth."""
     estimate = locate(measurement)
     (user,) = estimate.users
-    error = square = angle = offset = np.nan
-    if user.position is not None and user.covariance is not None:
-        away = (user.position - truth.user_position[USER])[:2]
-        error = float(np.linalg.norm(away))
-        square = float(away @ np.linalg.solve(user.covariance[:2, :2], away))
+    angle = offset = np.nan
+    error, square = position_errors(user, truth.user_position[USER])
     if estimate.mirrors:
         ends = truth.wall_start[WALL], truth.wall_end[WALL]
         walls = [wall_error(mirror, WALL, *ends) for mirror in estimate.mirrors]
         nearest = min(walls, key=lambda wall: abs(wall.offset) + wall.angle)
         angle, offset = nearest.angle, nearest.offset
     return Located(
-        status=user.status, error=error, square=square, wall_angle=angle, wall_offset=offset
+        status=user.status,
+        error=np.nan if error is None else error,
+        square=np.nan if square is None else square,
+        wall_angle=angle,
+        wall_offset=offset,
     )
 
 

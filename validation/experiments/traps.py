@@ -19,14 +19,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 from scipy.stats import chi2, norm
 
-from estimator.estimate import Estimate, Mirror, UserEstimate
+from estimator.estimate import Estimate, Mirror
 from estimator.localization import locate
 from scenes.library import load_scenario
 from simulator.simulation import simulate
-from validation.calibration import normalised_square
+from validation.calibration import position_errors
 from validation.metrics import distances_from_segment, nearest_wall, wall_error
 from validation.trap_rooms import TRAPS
 from validation.truth import Truth, truth_from_dataset
@@ -92,7 +91,7 @@ def trial(scenario: str, overrides: Sequence[str], *, seed: int) -> Trial:
     mirrors = seen_mirrors(estimate, truth)
     covered = {one.wall for one in mirrors}
     (only,) = estimate.users
-    error, square = errors(only, truth.user_position[only.name])
+    error, square = position_errors(only, truth.user_position[only.name])
     return Trial(
         mirrors=mirrors,
         missed=tuple(name for name in truth.wall_start if name not in covered),
@@ -104,17 +103,6 @@ def trial(scenario: str, overrides: Sequence[str], *, seed: int) -> Trial:
         square=square,
         duration=duration,
     )
-
-
-def errors(
-    answer: UserEstimate, truth: Float[np.ndarray, " 3"]
-) -> tuple[float | None, float | None]:
-    """Return the error of a position [m] and its square over its covariance [-]."""
-    if answer.position is None or answer.covariance is None:
-        return None, None
-    error = (answer.position - truth)[:2]
-    square = normalised_square(error, answer.covariance[:2, :2])
-    return float(np.linalg.norm(error)), square
 
 
 def seen_mirrors(estimate: Estimate, truth: Truth) -> tuple[SeenMirror, ...]:
