@@ -15,12 +15,15 @@ from validation.claim import Effort, Row
 from validation.claim_runs import rows_of, write_aside
 
 PAGE = "index.md"
+FORMS: tuple[Effort, ...] = ("quick", "full")
+"""The full one last: where both were measured, the page shows it."""
 
 HEAD = """# Results
 
 What `mmslam validate` measured: each claim with what the thesis or the theory says, our figure,
-its limit, and where that comes from. The command makes this page (`--record docs/results`);
-continuous integration measures the quick forms again and fails if a figure here no longer holds.
+its limit, and where that comes from. The command makes this page (`--record docs/results`).
+Continuous integration measures the quick forms again and fails if one of their figures, kept in
+`quick.json` beside this page, no longer holds.
 """
 
 DRIFT = 0.05
@@ -50,17 +53,22 @@ def record_results(document: Document, folder: Path, run_folder: Path) -> None:
             shutil.copyfile(run_folder / claim["picture"], copy)
             copy.replace(folder / f"{effort}_{claim['picture']}")
     write_aside(folder / f"{effort}.json", to_text(document))
-    write_aside(folder / PAGE, recorded_page(folder))
+    page = recorded_page(folder)
+    write_aside(folder / PAGE, page)
+    for form in FORMS:
+        for picture in folder.glob(f"{form}_*.png"):
+            if f"({picture.name})" not in page:
+                picture.unlink()
 
 
 def recorded_page(folder: Path) -> str:
     """Make the page from what a folder keeps: the full form of each claim if there is one."""
-    kept = {effort: read_record(folder, effort) for effort in ("full", "quick")}
+    kept = {effort: read_record(folder, effort) for effort in FORMS}
     chosen: dict[str, tuple[Effort, Mapping[str, Any]]] = {}
-    for effort in ("quick", "full"):  # the full one last: it wins
+    for effort in FORMS:
         for claim in (kept[effort] or {"claims": []})["claims"]:
             chosen[claim["key"]] = (effort, claim)
-    parts = [HEAD, _count([claim for _, claim in chosen.values()])]
+    parts = [HEAD, _sources(kept), _count([claim for _, claim in chosen.values()])]
     parts += [_section(claim, effort) for effort, claim in chosen.values()]
     return "\n".join(parts)
 
@@ -103,6 +111,15 @@ def _same(stated: Row, again: Row) -> bool:
     limits = [abs(limit) for limit in (stated.low, stated.high) if limit is not None]
     scale = max([abs(stated.measured), *limits])
     return abs(again.measured - stated.measured) <= DRIFT * scale
+
+
+def _sources(kept: Mapping[Effort, Document | None]) -> str:
+    """Name the sources that were measured; a form that is behind the other is not hidden."""
+    codes = {effort: document["code"] for effort, document in kept.items() if document is not None}
+    told = ", ".join(f"{effort} forms by sources `{code}`" for effort, code in codes.items())
+    if len(set(codes.values())) > 1:
+        told += ", which differ: one form was recorded later than the other"
+    return f"Measured: {told} (a digest of ours and of the libraries' versions).\n"
 
 
 def _count(claims: list[Mapping[str, Any]]) -> str:

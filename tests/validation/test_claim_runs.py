@@ -1,5 +1,6 @@
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -105,13 +106,39 @@ def test_the_page_of_results_says_what_was_measured(tmp_path: Path) -> None:
         claim(lambda: Finding(rows=[row(0.5)], draw=lambda figure: None)),
         claim(lambda: Finding(rows=[row(2.0)]), "other"),
     )
-    document = {"effort": "quick", "claims": [run_document(run) for run in found]}
+    document = {
+        "effort": "quick",
+        "code": "a1b2",
+        "claims": [run_document(run) for run in found],
+    }
     record_results(document, tmp_path / "docs", tmp_path / "run")
     page = (tmp_path / "docs" / "index.md").read_text()
     assert page == recorded_page(tmp_path / "docs")
     assert "1 of 2 figures of 2 claims are within their limits" in page
     assert "| length | 1 m | 2 m | ≤ 1 m | the ruler | **fails** |" in page
+    assert "quick forms by sources `a1b2` (" in page
     assert (tmp_path / "docs" / "quick_ruler.png").is_file()
+
+
+def as_it_is(finding: Finding) -> Finding:
+    """Measure nothing."""
+    return finding
+
+
+def test_the_page_shows_the_full_form_and_says_if_the_quick_one_is_of_other_sources(
+    tmp_path: Path,
+) -> None:
+    for effort, code, length in (("quick", "a1b2", 0.25), ("full", "c3d4", 0.75)):
+        finding = Finding(rows=[row(length)], draw=lambda figure: None)
+        (run,) = runs(tmp_path / effort, claim(partial(as_it_is, finding)))
+        document = {"effort": effort, "code": code, "claims": [run_document(run)]}
+        record_results(document, tmp_path / "docs", tmp_path / effort)
+    page = (tmp_path / "docs" / "index.md").read_text()
+    assert "0.75 m" in page
+    assert "0.25 m" not in page
+    assert "quick forms by sources `a1b2`, full forms by sources `c3d4`, which differ" in page
+    # A picture that the page no longer shows is not left behind.
+    assert [path.name for path in (tmp_path / "docs").glob("*.png")] == ["full_ruler.png"]
 
 
 def test_a_stated_figure_that_no_longer_holds_is_named(tmp_path: Path) -> None:

@@ -102,8 +102,13 @@ def solver(effort: Effort, tell: Tell) -> Finding:
 
 def trust(effort: Effort, tell: Tell) -> Finding:
     """Compare the simulator with full wave over rms height and correlation length."""
-    found = full_wave_roughness.trust_map()
-    tell(1, 1)
+    told: list[full_wave_roughness.Comparison] = []
+
+    def advance(comparison: full_wave_roughness.Comparison) -> None:
+        told.append(comparison)
+        tell(len(told), len(full_wave_roughness.STATISTICS))
+
+    found = full_wave_roughness.trust_map(advance=advance)
     rows = []
     for one in found:
         statistics = (one.rms_mm, one.correlation_mm)

@@ -2,6 +2,7 @@
 
 from matplotlib.figure import Figure
 
+from validation.calibration import coverage
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import baselines as others
 from validation.experiments import position_bounds as bounds
@@ -13,8 +14,11 @@ NO_ANSWER = 1e3  # an error that stands for none [m]
 
 def position_bounds(effort: Effort, tell: Tell) -> Finding:
     """Compare measured errors with the Cramér-Rao bound and the floor that roughness sets."""
-    found = bounds.position_bounds(bounds.FULL if effort == "full" else bounds.QUICK)
-    tell(1, 1)
+    chosen = bounds.FULL if effort == "full" else bounds.QUICK
+    found: list[bounds.Comparison] = []
+    for comparison in bounds.position_bounds(chosen):
+        found.append(comparison)
+        tell(len(found), chosen.comparisons)
     rows = []
     for sweep in dict.fromkeys(one.sweep for one in found):
         for case in dict.fromkeys(one.case for one in found if one.sweep == sweep):
@@ -66,8 +70,10 @@ def position_bounds(effort: Effort, tell: Tell) -> Finding:
 
 def other_methods(effort: Effort, tell: Tell) -> Finding:
     """Locate the same users by the methods of the thesis' introduction."""
-    trials = list(others.baselines())
-    tell(1, 1)
+    trials: list[others.Trial] = []
+    for trial in others.baselines():
+        trials.append(trial)
+        tell(len(trials), others.TRIALS)
     found = others.summaries(trials)
     ours = {case: found[others.OURS, case] for case in others.CASES}
     rows = []
@@ -126,10 +132,16 @@ def other_methods(effort: Effort, tell: Tell) -> Finding:
 def calibration(effort: Effort, tell: Tell) -> Finding:
     """Compare errors with the covariances that are told."""
     rows = []
-    variants = uncertainty_calibration.VARIANTS
+    results = {}
+    variants, trials = uncertainty_calibration.VARIANTS, uncertainty_calibration.TRIALS
     for number, (name, variant) in enumerate(variants.items()):
-        found = uncertainty_calibration.calibration(*variant, trials=uncertainty_calibration.TRIALS)
-        tell(number + 1, len(variants))
+        before = number * trials
+
+        def advance(done: int, count: int, before: int = before) -> None:
+            tell(before + done, len(variants) * count)
+
+        found = uncertainty_calibration.calibration(*variant, trials=trials, tell=advance)
+        results[name] = found
         rows.append(
             Row(
                 name=f"{name}: within the 99.99 % region, of {found.found} answers",
@@ -138,6 +150,16 @@ def calibration(effort: Effort, tell: Tell) -> Finding:
                 unit="%",
                 low=98.0,
                 origin="no more than a trial in fifty is confidently wrong",
+            )
+        )
+        rows.append(
+            Row(
+                name=f"{name}: walls within the 99.99 % region, of {found.wall_squares.size}",
+                stated="99.99 %",
+                measured=100 * coverage(found.wall_squares, probability=0.9999, axes=2).share,
+                unit="%",
+                low=98.0,
+                origin="the same of its angle and offset",
             )
         )
         if name == "hidden":
@@ -152,7 +174,13 @@ def calibration(effort: Effort, tell: Tell) -> Finding:
                     origin="the issue's bound; 200 trials scatter by 1.5 %",
                 )
             )
-    return Finding(rows=rows)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots(1, len(results))
+        for ax, (name, result) in zip(axes, results.items(), strict=True):
+            uncertainty_calibration.draw(ax, name, result)
+
+    return Finding(rows=rows, draw=draw)
 
 
 def pitfalls(effort: Effort, tell: Tell) -> Finding:

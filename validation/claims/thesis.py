@@ -33,8 +33,7 @@ def design_numbers(effort: Effort, tell: Tell) -> Finding:
 
 def drywall(effort: Effort, tell: Tell) -> Finding:
     """Measure drywall against a metal mirror bistatically at 330 GHz."""
-    levels = fig02_07_rcs_drywall.measured_levels(load_scenario("rcs_drywall"))
-    tell(1, 1)
+    levels = fig02_07_rcs_drywall.measured_levels(load_scenario("rcs_drywall"), tell=tell)
 
     def draw_levels(figure: Figure) -> None:
         fig02_07_rcs_drywall.draw(figure.subplots(), levels)

@@ -68,6 +68,8 @@ EXACT_IN_SIGHT = ("ToA, 4 anchors", "AoA+ToA, no map")
 """Methods that nothing hinders in line of sight."""
 
 SURVEYED = ("RSSI/AoA fingerprints",)
+POSITIONS, SEEDS = 3, 2
+TRIALS = len(CASES) * POSITIONS * SEEDS * (len(METHODS) + 1)
 MILLIMETRE, MOST = 1e-3, 5e-3
 DECIMETRES = 0.1
 """Error that all methods without a map exceed where the user is hidden: its image is as far
@@ -89,7 +91,7 @@ class Trial:
 
 
 def baselines(
-    *, positions: int = 3, seeds: int = 2, methods: Sequence[str] = (*METHODS, OURS)
+    *, positions: int = POSITIONS, seeds: int = SEEDS, methods: Sequence[str] = (*METHODS, OURS)
 ) -> Iterator[Trial]:
     """Run the methods on all cases, ours last in each room.
 

@@ -40,7 +40,7 @@ from scenes.objects import Plate
 from scenes.scenario import Scenario
 from simulator.radio_scene import scenario_materials
 from simulator.simulation import simulate
-from validation.claim import Row
+from validation.claim import Row, Tell
 from validation.rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link
 from validation.row_table import conclude
 
@@ -125,7 +125,12 @@ def off_specular_deg(plate: Plate, links: list[Antennas]) -> Float[np.ndarray, "
     return np.array(angles)
 
 
-def measured_levels(scenario: Scenario, *, realisations: int = REALISATIONS) -> Levels:
+def measured_levels(
+    scenario: Scenario,
+    *,
+    realisations: int = REALISATIONS,
+    tell: Tell = lambda done, count: None,
+) -> Levels:
     """Simulate rough samples, the smooth one and the metal mirror, and the closed forms.
 
     The drywall's whole level is that of the first sample, its diffuse one the mean over all.
@@ -137,7 +142,10 @@ def measured_levels(scenario: Scenario, *, realisations: int = REALISATIONS) -> 
     assert plate.roughness is not None
     links, frequencies = links_of(scenario), scenario.radio.frequencies
     material = scenario_materials(scenario)[SAMPLE]
-    echoes = [echo_of(scenario, seed) for seed in range(realisations)]
+    echoes = []
+    for seed in range(realisations):
+        echoes.append(echo_of(scenario, seed))
+        tell(seed + 1, realisations)
     loss = np.array(
         [
             [coherent_loss(plate, plate.roughness, link, float(f)) for f in frequencies]

@@ -27,7 +27,7 @@ over a wall of 5 µm, about once from 20 µm upward.
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -107,6 +107,12 @@ class Effort:
     distance: tuple[float, ...]  # [m]
     rms: tuple[float, ...]  # of the wall's heights [m]
 
+    @property
+    def comparisons(self) -> int:
+        """How many comparisons that makes."""
+        free = sum(map(len, (self.snr_db, self.bandwidth, self.elements, self.distance)))
+        return 2 * free + len(self.snr_db) + 2 * len(self.rms)
+
 
 FULL = Effort(
     trials=30,
@@ -128,27 +134,21 @@ QUICK = Effort(
 )
 
 
-def position_bounds(effort: Effort = FULL) -> tuple[Comparison, ...]:
-    """Run all sweeps."""
-    found: list[Comparison] = []
+def position_bounds(effort: Effort = FULL) -> Iterator[Comparison]:
+    """Run all sweeps; yields each comparison as it is known."""
+    trials = effort.trials
     for mirrored in (False, True):
-        found += [free_space(mirrored, effort.trials, snr_db=snr) for snr in effort.snr_db]
-        found += [
-            free_space(mirrored, effort.trials, sweep="bandwidth", bandwidth=bandwidth)
-            for bandwidth in effort.bandwidth
-        ]
-        found += [
-            free_space(mirrored, effort.trials, sweep="elements", elements=elements)
-            for elements in effort.elements
-        ]
-        found += [
-            free_space(mirrored, effort.trials, sweep="distance", distance=distance, step=FINE_STEP)
-            for distance in effort.distance
-        ]
-    found += rough_wall_over_snr(effort.snr_db, effort.realisations)
+        for snr in effort.snr_db:
+            yield free_space(mirrored, trials, snr_db=snr)
+        for bandwidth in effort.bandwidth:
+            yield free_space(mirrored, trials, sweep="bandwidth", bandwidth=bandwidth)
+        for elements in effort.elements:
+            yield free_space(mirrored, trials, sweep="elements", elements=elements)
+        for distance in effort.distance:
+            yield free_space(mirrored, trials, sweep="distance", distance=distance, step=FINE_STEP)
+    yield from rough_wall_over_snr(effort.snr_db, effort.realisations)
     for rms in effort.rms:
-        found += rough_wall_over_height(rms, effort.realisations)
-    return tuple(found)
+        yield from rough_wall_over_height(rms, effort.realisations)
 
 
 def free_space(
@@ -422,7 +422,7 @@ def main(arguments: list[str]) -> None:
     quick = "--quick" in arguments
     names = [argument for argument in arguments if argument != "--quick"]
     path = Path(names[0] if names else "position_bounds.png")
-    comparisons = position_bounds(QUICK if quick else FULL)
+    comparisons = tuple(position_bounds(QUICK if quick else FULL))
     write_numbers(path.with_suffix(".csv"), comparisons)
     figure, axes = plt.subplots(2, 3, figsize=(14, 8), layout="constrained")
     for ax, sweep in zip(axes.ravel(), UNITS, strict=True):

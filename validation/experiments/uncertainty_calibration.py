@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from estimator.estimate import Mirror
@@ -25,6 +26,7 @@ from estimator.localization import locate
 from scenes.library import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import coverage, normalised_square
+from validation.claim import Tell
 from validation.truth import Truth, truth_from_dataset
 
 TRIALS = 200
@@ -58,7 +60,13 @@ class Calibration:
         return float(np.mean(self.squares < chi2.ppf(probability, 2)))
 
 
-def calibration(scenario: str, overrides: tuple[str, ...], *, trials: int) -> Calibration:
+def calibration(
+    scenario: str,
+    overrides: tuple[str, ...],
+    *,
+    trials: int,
+    tell: Tell = lambda done, count: None,
+) -> Calibration:
     """Simulate and locate one user behind or beside one wall, many times."""
     scene = load_scenario(scenario, overrides)
     errors, squares, wall_squares = [], [], []
@@ -66,6 +74,7 @@ def calibration(scenario: str, overrides: tuple[str, ...], *, trials: int) -> Ca
         simulation = simulate(scene, seed=seed)
         truth = truth_from_dataset(simulation.truth)
         estimate = locate(simulation.measurement)
+        tell(seed + 1, trials)
         if estimate.mirrors:
             wall_squares.append(wall_square(estimate.mirrors[0], truth, "wall"))
         (user,) = estimate.users
@@ -94,6 +103,44 @@ def wall_square(mirror: Mirror, truth: Truth, name: str) -> float:
     away = (middle - truth.wall_start[name])[:2]
     error = np.array([tilt, away[0] * true[1] - away[1] * true[0]])
     return normalised_square(error, mirror.covariance)
+
+
+def draw(ax: Axes, name: str, result: Calibration) -> Axes:
+    """Draw the share of trials whose error exceeds a square, beside that of χ²."""
+    probabilities = (0.95, 0.999)
+    most = float(chi2.ppf(0.9999, 2))
+    for squares, what, colour in (
+        (result.squares, "user", "#d1495b"),
+        (result.wall_squares, "wall", "#30638e"),
+    ):
+        if squares.size:
+            # The n-th largest of N is exceeded, at its own value, by n of N.
+            shares = np.arange(squares.size, 0, -1) / squares.size
+            ax.step(np.sort(squares), shares, where="pre", color=colour, label=what)
+            most = max(most, 1.05 * float(squares.max()))
+    expected = np.linspace(0.0, most, 200)
+    ax.plot(expected, chi2.sf(expected, 2), "k--", label="χ², two degrees of freedom")
+    for probability in probabilities:
+        ax.axvline(chi2.ppf(probability, 2), color="0.6", lw=0.8)
+        ax.annotate(
+            f"{100 * probability:g} %",
+            (chi2.ppf(probability, 2), 1.0),
+            xytext=(3, -3),
+            textcoords="offset points",
+            va="top",
+            fontsize=8,
+        )
+    ax.set(
+        xlabel="error over its stated covariance, e'C⁻¹e [-]",
+        ylabel="share of trials above [-]",
+        yscale="log",
+        ylim=(0.5 / result.trials, 1.0),
+        xlim=(0.0, most),
+        title=f"{name}: {result.found} of {result.trials} found",
+    )
+    ax.grid(alpha=0.25)
+    ax.legend(fontsize=8, loc="upper right", bbox_to_anchor=(1.0, 0.92))
+    return ax
 
 
 def table_row(name: str, result: Calibration) -> str:
