@@ -7,6 +7,7 @@ its kernel, so a C++ compiler is needed) takes part if it is installed.
 import importlib
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -170,8 +171,7 @@ def slopes() -> None:
             echo = echo_of_targets(sizes["positions"], sizes["freqs"])
             axis = np.linspace(-0.25, 0.25, sizes["pixels"])
             points = PixelGrid.plane(x=axis, y=axis + 0.65).points
-            # mypy infers no type for a lambda with defaults.
-            row.append(fastest({"": lambda e=echo, p=points: backproject(e, p)}, repeats=5)[""])  # type: ignore[misc]
+            row.append(fastest({"": partial(backproject, echo, points)}, repeats=5)[""])
         slope = np.polyfit(np.log([1, 2, 4]), np.log(row), 1)[0]
         print(f"  {size:10s}" + "".join(f"{t:9.4f}" for t in row) + f"   slope {slope:.2f}")
 

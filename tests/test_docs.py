@@ -39,6 +39,7 @@ from scenes.library import load_scenario
 from scenes.toml_writer import toml_text
 from simulator.dataset import make_dataset, plan_dataset
 from simulator.resumable_work import Workers
+from validation.claims import ALL_CLAIMS
 from validation.sweep import Outcome, plan_sweep
 from validation.sweep_tables import error_dataset
 
@@ -274,6 +275,20 @@ def test_commands_that_are_named_in_a_line_exist_with_their_options() -> None:
                     assert word in known, f"{page}: mmslam {found}: no {word}"
                     checked += 1
     assert checked >= 5
+
+
+def test_claims_that_commands_name_exist() -> None:
+    chosen = [
+        (place, words[index + 1])
+        for place, words in commands()
+        if words[:2] == ["mmslam", "validate"]
+        for index, word in enumerate(words)
+        if word == "--only"
+    ]
+    assert chosen
+    keys = {claim.key for claim in ALL_CLAIMS}
+    for place, key in chosen:
+        assert key in keys, f"{place}: --only {key}; known: {', '.join(sorted(keys))}"
 
 
 def test_modules_and_files_that_commands_name_exist() -> None:
