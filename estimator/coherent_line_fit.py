@@ -14,7 +14,8 @@ brightest line of an image: each cell's speckle in its neighbours' sidelobes, le
 along the wall, and its ends.
 
 What is left is noise and what the wall's own heights do beyond first order; both push the line
-independently from place to place, so the covariance follows from the pushes themselves.
+independently from part to part, so the covariance follows from the pushes themselves
+(:mod:`estimator.clustered_covariance`).
 
 References
 ----------
@@ -30,6 +31,7 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import zherk
 
+from estimator.clustered_covariance import clustered_covariance
 from estimator.dirichlet_profiles import Sweep, point_profiles
 from estimator.measurement import Echo, frequency_step
 from estimator.projection import unit_normal
@@ -54,11 +56,10 @@ FARTHEST_STEP = 0.5
 """A step that moves an end by more says that the row explains something else. [cells]"""
 FEWEST_CELLS = 7
 """A shorter line is a point's neighbourhood."""
-MODES = 12
-"""Slow modes along the wall that tell how strong pushes are that move it."""
-PUSH_SHARE = 1.3
-"""Variance of tilt and offset over what these modes say, so that a 95 % region is one: the square
-of an error over a variance known from so few is F-distributed."""
+PART = 3.0
+"""Length of the parts of a wall that push it independently of each other. Within it they do not:
+what the row does not hold of a real wall's echo, say how an antenna's pattern weighs its parts at
+each position, pushes neighbours against each other, and hardly moves the line. [cells]"""
 DEPTH = 4e-6
 """Of a wall's surface, against where it reflects: the phase of a lossy material's reflection
 changes with frequency as if it lay deeper. On drywall at 220 to 330 GHz 3 to 6 µm were measured;
@@ -144,10 +145,10 @@ def fit_coherently(
         ):
             return None
     pushes = (strengths.conj() * _adjoint(slopes, left)).real
-    columns = np.sqrt(_slow_share(pushes, levers)) * np.stack([pushes, pushes * levers])
-    softness = np.linalg.inv(stiffness)
-    # Of (offset, displacement of the ends), whatever each place's own variance is.
-    by_step = PUSH_SHARE * softness @ columns @ columns.T @ softness
+    gains = (strengths.conj()[:, None] * _adjoint(slopes, moved)).real
+    designs = np.stack([np.ones_like(levers), levers], axis=-1)
+    # Of (offset, displacement of the ends).
+    by_step = clustered_covariance(places, designs, pushes, gains, part=PART * cell_along)
     # An end that moves along the normal by δ turns the line by −2δ over its length.
     to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
     covariance = to_angle @ by_step @ to_angle.T
@@ -161,20 +162,6 @@ def _adjoint(
 ) -> Complex[np.ndarray, "columns *some"]:
     """Multiply the conjugate transpose of a large matrix, without a copy of it."""
     return np.asarray((matrix.T @ values.conj()).conj())
-
-
-def _slow_share(
-    pushes: Float[np.ndarray, " places"], levers: Float[np.ndarray, " places"]
-) -> float:
-    """Return the power of slow pushes over that of independent ones.
-
-    What the row does not hold of a real wall's echo, say how an antenna's pattern weighs its
-    parts at each position, pushes neighbours against each other, and hardly moves the line. Orders
-    0 and 1 along the wall, which do, are at rest; those that follow tell how strong they were.
-    """
-    polynomials = np.polynomial.legendre.legvander(levers / np.abs(levers).max(), MODES + 1)
-    slow = np.linalg.qr(polynomials)[0][:, 2:]
-    return float(np.sum((slow.T @ pushes) ** 2) / np.sum(slow.T**2 @ pushes**2))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,7 @@ FAINT_DB = -30.0
 """Below this gain, relative to the antennas' peaks, a path is drawn faint: nobody hears it."""
 
 _BEAM = 0.25  # length of the wedge that shows where an antenna looks, over the view's size
+_MARGIN = 0.15  # around all that is drawn, over the view's size: room for names beside walls
 
 
 def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = ()) -> Axes:
@@ -43,7 +44,7 @@ def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = 
     points += [] if station.transmitter is None else [station.transmitter.positions]
     points += [place[None] for place in users.values()]
     points += [target.position[None] for target in scenario.points.values()]
-    view = views.view_around(np.concatenate(points))
+    view = views.view_around(np.concatenate(points), margin=_MARGIN)
     size = max(view.right - view.left, view.top - view.bottom)
     ax.grid(color="#dfe4e8", lw=0.6)
     ax.set_axisbelow(True)
@@ -164,7 +165,7 @@ def _draw_object(
     rough = f", {body.roughness.rms_mm:g} mm rms" if body.roughness else ""
     centre = line.mean(axis=0)
     ax.annotate(
-        f"{name} ({material}{rough})",
+        f"{name}\n{material}{rough}",
         (float(centre[0]), float(centre[1])),
         xytext=(0, 8),
         textcoords="offset points",

@@ -104,9 +104,8 @@ def test_a_flat_wall_without_noise_is_found_however_its_speckle_falls() -> None:
 
 
 def test_the_covariance_is_that_of_the_errors_for_noise_and_for_rough_heights() -> None:
-    # 24 walls: the mean of a χ² of two degrees of freedom has a deviation of 2/√24 = 0.4. The
-    # stated covariance is 1.3 of independent pushes, and with noise alone they are independent
-    # but for the scatterers being finer than a cell.
+    # 24 walls: the mean of a χ² of two degrees of freedom has a deviation of 2/√24 = 0.4, and
+    # parts of a wall that push against each other leave the stated covariance too large.
     rng = np.random.default_rng(2)
     squares = []
     for depth, noise in ((30e-6, 0.0), (0.0, 3.0)):

@@ -42,7 +42,7 @@ def test_a_plate_is_drawn_from_end_to_end() -> None:
 def test_every_object_and_user_is_named_in_the_plan() -> None:
     ax = draw_scenario(Figure().subplots(), load_scenario("slam_2d"))
     named = " ".join(text.get_text() for text in ax.texts)
-    assert "wall (metal, 0.05 mm rms)" in named
+    assert "wall\nmetal, 0.05 mm rms" in named
     assert "user" in named
     assert "array" in named
 
