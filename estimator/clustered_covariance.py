@@ -21,6 +21,9 @@ FEWEST_PARTS = 4
 LEAST_LEFT = 1e-3
 """Least share of the normal matrix that is taken to lie outside a part: a line that stands on
 one glint is not known, and its variance is large, not infinite. [-]"""
+TIE = 1e-6
+"""By how much a place may lie before a cut and still belong after it: evenly spaced places lie on
+cuts but for rounding, which must not decide. [parts]"""
 
 
 def clustered_covariance(
@@ -60,11 +63,11 @@ def clustered_covariance(
     normal = designs.T @ gains
     values, vectors = np.linalg.eigh(np.linalg.inv(0.5 * (normal + normal.T)))
     root = (vectors * np.sqrt(values)) @ vectors.T
-    count = max(FEWEST_PARTS, int((places[-1] - places[0]) / part))
+    count = max(FEWEST_PARTS, int((places[-1] - places[0]) / part + TIE))
     position = count * (places - places[0]) / (places[-1] - places[0])
     covariance = np.zeros_like(root)
     for shift in (0.0, 0.5):
-        first = _first_of_parts(np.minimum(position + shift, count + shift - 1e-9))
+        first = _first_of_parts(np.minimum(position + shift, count + shift - 2 * TIE))
         pushed = np.add.reduceat(pushes[:, None] * designs, first)
         held = np.add.reduceat(designs[:, :, None] * gains[:, None, :], first)
         shares, axes = np.linalg.eigh(root @ (0.5 * (held + held.swapaxes(1, 2))) @ root)
@@ -76,4 +79,4 @@ def clustered_covariance(
 
 def _first_of_parts(position: Float[np.ndarray, " places"]) -> Int[np.ndarray, " parts"]:
     """Return the index of each part's first place; a part without places is none."""
-    return np.flatnonzero(np.diff(np.floor(position), prepend=-1.0))
+    return np.flatnonzero(np.diff(np.floor(position + TIE), prepend=-1.0))

@@ -79,3 +79,13 @@ def test_a_line_that_hangs_on_one_glint_turns_as_the_rest_of_the_wall_lets_it() 
     # The glint is a hinge; the other places tell the tilt about it.
     tilt = 1 / np.sum((DESIGNS[:, 1] - DESIGNS[180, 1]) ** 2)
     assert covariances[:, 1, 1].mean() == pytest.approx(tilt, rel=0.1)
+
+
+def test_rounding_does_not_decide_to_which_part_a_place_belongs() -> None:
+    # 241 places in twelve parts: every twentieth lies on a cut.
+    pushes = np.random.default_rng(2).normal(size=PLACES.size)
+    first, other = (
+        clustered_covariance(places, DESIGNS, pushes, DESIGNS, part=PART)
+        for places in (PLACES * (1 - 1e-13), PLACES * (1 + 1e-13) + 1e-16)
+    )
+    np.testing.assert_allclose(first, other, rtol=1e-9)
