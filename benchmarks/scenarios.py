@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenes.library import load_scenario, scenario_names
+from scenes.files.loading import load_scenario, scenario_names
 
 
 @dataclass(frozen=True, kw_only=True)

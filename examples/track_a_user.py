@@ -18,7 +18,7 @@ import xarray as xr
 
 from estimator.storage import measurement_to_dataset
 from mmslam.moving_users import track_store
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import parse_scenario
 from simulator.simulation import simulate
 

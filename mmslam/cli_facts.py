@@ -88,7 +88,7 @@ def design(
     """Print resolutions, unambiguous ranges, needed steps and field regions of a radio."""
     with told_clearly():
         from mmslam.design import design_document, design_lines, design_rows, scenario_radio
-        from scenes.library import load_scenario
+        from scenes.files.loading import load_scenario
 
         given = {
             "start_ghz": start_ghz,

@@ -41,7 +41,7 @@ def scenes(
     """List the built-in scenarios, or look at, draw or export one."""
     with told_clearly():
         from mmslam import scenario_commands as commands
-        from scenes.library import load_scenario, scenario_schema
+        from scenes.files.loading import load_scenario, scenario_schema
 
         if schema:
             print_json(scenario_schema())
@@ -74,7 +74,7 @@ def run(
     """
     with told_clearly():
         from mmslam.progress import StageProgress
-        from scenes.library import load_scenario
+        from scenes.files.loading import load_scenario
 
         loaded = load_scenario(scenario, overrides or [])
         folder = out or Path("out") / f"{loaded.name}-{seed}"
@@ -95,7 +95,7 @@ def simulate(
     """Simulate the measurement of a scenario, and write it with its truth to one file."""
     with told_clearly():
         from mmslam.progress import StageProgress
-        from scenes.library import load_scenario
+        from scenes.files.loading import load_scenario
 
         loaded = load_scenario(scenario, overrides or [])
         with stdout_kept_clean(), StageProgress() as progress:

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from estimator.measurement import Echo, Measurement, Uplink
 from mmslam.touchstone_files import touchstone_text
 from mmslam.touchstone_folder import COORDINATES, TRANSMIT_COORDINATES
-from scenes.toml_writer import toml_text
+from scenes.files.toml_writer import toml_text
 
 MAPPING = "mapping.toml"
 """Name of the mapping file in the folder; `mmslam import` looks for it there."""

@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from scipy.constants import speed_of_light
 
 from estimator.measurement import Measurement
-from scenes.library import scenario_to_toml
+from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Scenario
 
 CAPTIONS = {

@@ -7,8 +7,8 @@ import typer
 
 from mmslam.failures import stdout_kept_clean
 from mmslam.output import OutputError
-from scenes.library import load_scenario, scenario_names, scenario_to_toml
-from scenes.relocatable import relocatable
+from scenes.files.loading import load_scenario, scenario_names, scenario_to_toml
+from scenes.files.relocatable import relocatable
 from scenes.scenario import Scenario
 
 

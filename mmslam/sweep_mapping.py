@@ -12,8 +12,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from estimator.measurement import MeasurementError
 from mmslam.file_pattern import fields_of_pattern
-from scenes.quantities import Checked
-from scenes.scenario_error import problems
+from scenes.schema.errors import problems
+from scenes.schema.quantities import Checked
 
 LARGEST_FILE = 10 * 2**20
 """Largest mapping file that is read [byte]."""

@@ -11,23 +11,23 @@ from jaxtyping import Float
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from scenes.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
-from scenes.base_station import BaseStation
-from scenes.directions import unit_vector
-from scenes.facet_spacing import facet_problems, facet_spacing
-from scenes.file_problems import file_problems
-from scenes.geometry import with_geometry
-from scenes.impairments import Impairments
-from scenes.materials import MATERIALS, Slab
-from scenes.mesh_file import placed_mesh
-from scenes.multistatic import Arc, Places, Transmitter
-from scenes.multistatic_problems import antenna_places, multistatic_problems
-from scenes.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
-from scenes.placement import inconsistencies
-from scenes.point_target import PointTarget
-from scenes.quantities import Checked, Name, Position
-from scenes.radio import Radio
-from scenes.scenario_error import ScenarioError, did_you_mean, problems
+from scenes.checks.files import file_problems
+from scenes.checks.multistatic import antenna_places, multistatic_problems
+from scenes.checks.placement import inconsistencies
+from scenes.meshes.foreign_scene import with_geometry
+from scenes.meshes.mesh_file import placed_mesh
+from scenes.schema.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
+from scenes.schema.base_station import BaseStation
+from scenes.schema.directions import unit_vector
+from scenes.schema.errors import ScenarioError, did_you_mean, problems
+from scenes.schema.impairments import Impairments
+from scenes.schema.materials import MATERIALS, Slab
+from scenes.schema.multistatic import Arc, Places, Transmitter
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
+from scenes.schema.point_target import PointTarget
+from scenes.schema.quantities import Checked, Name, Position
+from scenes.schema.radio import Radio
+from scenes.surfaces.facet_spacing import facet_problems, facet_spacing
 
 __all__ = [
     "MATERIALS",
@@ -157,9 +157,9 @@ class Scenario(Checked):
         return self
 
     def facet_spacing(self, name: str) -> float:
-        """Return the largest facet spacing that an object needs; see :mod:`scenes.facet_spacing`.
+        """Return the largest facet spacing that an object needs.
 
-        Infinity for an absorber: it scatters nothing. [m]
+        See :mod:`scenes.surfaces.facet_spacing`. Infinity for an absorber: it scatters nothing. [m]
         """
         return facet_spacing(self.objects[name], self.radio.shortest_wavelength)
 
@@ -240,7 +240,7 @@ def parse_scenario(data: Mapping[str, object]) -> Scenario:
     Parameters
     ----------
     data
-        The tables; see :class:`Scenario`, and :class:`scenes.geometry.Geometry` for the
+        The tables; see :class:`Scenario`, and :class:`scenes.meshes.foreign_scene.Geometry` for the
         table ``geometry``, which brings in a foreign scene.
 
     Raises

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas import field_gain, horn_beam_sigma
 
 

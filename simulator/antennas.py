@@ -10,7 +10,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 
 
 def field_gain(

@@ -19,8 +19,8 @@ from jaxtyping import Bool, Complex, Float, Float32
 from scipy.constants import speed_of_light
 
 from estimator import engine
-from scenes.antenna import Antenna, Isotropic
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
+from scenes.schema.antenna import Antenna, Isotropic
 from simulator.antennas import field_gain
 from simulator.facet_kernel import triangle_transform
 from simulator.materials import Conductor, Material, reflection

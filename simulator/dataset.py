@@ -16,9 +16,9 @@ import numpy as np
 import zarr
 
 from estimator.storage import PARAMETERS
-from scenes.library import ScenarioSource
-from scenes.sample_space import SampleSpace, open_sample_space
-from scenes.variations import load_variations
+from scenes.files.loading import ScenarioSource
+from scenes.sampling.sample_space import SampleSpace, open_sample_space
+from scenes.sampling.variations import load_variations
 from simulator.dataset_config import DatasetConfig, differences, identity
 from simulator.dataset_layout import Layout, dataset_layout
 from simulator.dataset_row import failed_row, make_row

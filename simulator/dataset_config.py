@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from scenes.sample_space import SampleSpace
-from scenes.scenario_error import ScenarioError
-from scenes.toml_writer import toml_text
-from scenes.variations import Variations
+from scenes.files.toml_writer import toml_text
+from scenes.sampling.sample_space import SampleSpace
+from scenes.sampling.variations import Variations
+from scenes.schema.errors import ScenarioError
 from simulator.code_version import code_digest, package_versions
 
 FORMAT = 1

@@ -15,9 +15,9 @@ import numpy as np
 from estimator.measurement import Measurement
 from estimator.storage import CONVENTIONS, PARAMETERS, TRUTH
 from estimator.storage import FORMAT as MEASUREMENT_FORMAT
-from scenes.sample_space import SampleSpace
+from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import Scenario
-from scenes.scenario_error import ScenarioError
+from scenes.schema.errors import ScenarioError
 from simulator.dataset_config import FORMAT, DatasetConfig, identity
 from simulator.dataset_variables import (
     CLOCK,

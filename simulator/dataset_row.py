@@ -9,10 +9,10 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement import Measurement
 from estimator.storage import PARAMETERS, TRUTH
-from scenes.drawn_parameters import Parameter
-from scenes.objects import Plate
-from scenes.sample_space import Attempt, SampleSpace, impossible_sample
+from scenes.sampling.drawn_parameters import Parameter
+from scenes.sampling.sample_space import Attempt, SampleSpace, impossible_sample
 from scenes.scenario import Scenario, ScenarioError
+from scenes.schema.objects import Plate
 from simulator.dataset_layout import Layout, fits
 from simulator.dataset_variables import FAILED, MADE
 

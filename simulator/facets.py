@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.materials import Conductor, Material
 
 CELLS_AT_ONCE = 1_000_000

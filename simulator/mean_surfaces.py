@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from scenes.objects import Box, Cylinder, MeshFile, Plate
+from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario
-from scenes.shapes import Surface, object_surface
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.materials import Absorber, Conductor, Material
 from simulator.mirrors import Mirrors, line_mirrors
 

@@ -14,11 +14,11 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Bool, Complex, Float
 
-from scenes.antenna import Antenna
-from scenes.objects import Plate
-from scenes.plate_tiles import PlateSheet, Tile, plate_sheet
+from scenes.realisations.object_surface import Surface, object_surface
+from scenes.realisations.plate_tiles import PlateSheet, Tile, plate_sheet
 from scenes.scenario import Scenario
-from scenes.shapes import Surface, object_surface
+from scenes.schema.antenna import Antenna
+from scenes.schema.objects import Plate
 from simulator.bistatic_kernel import BistaticKernel, Port, pattern_table
 from simulator.facets import Facets, surface_facets
 from simulator.materials import Absorber, Material

@@ -7,7 +7,7 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Bool
 
-from scenes.scenario_error import ScenarioError
+from scenes.schema.errors import ScenarioError
 from simulator.one_way_field import Face
 from simulator.ray_scene import CLEARANCE, RAYS_AT_ONCE, blocked
 

@@ -12,13 +12,13 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import epsilon_0
 
-from scenes.permittivity_table import (
+from scenes.schema.errors import ScenarioError
+from scenes.schema.permittivity_table import (
     band_problem,
     read_permittivity_table,
     table_problem,
     value_problem,
 )
-from scenes.scenario_error import ScenarioError
 
 
 class MaterialError(ValueError):

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from scenes.antenna import Antenna
 from scenes.scenario import User
+from scenes.schema.antenna import Antenna
 from simulator.antennas import field_gain
 from simulator.radio_scene import RadioScene
 from simulator.ray_scene import blocked

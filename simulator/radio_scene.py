@@ -8,12 +8,12 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Float
 
-from scenes.antenna import Antenna, Isotropic
-from scenes.materials import Slab
 from scenes.random_streams import random_stream
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario, ScenarioError
-from scenes.shapes import object_surface
-from scenes.tiled_faces import Reach
+from scenes.schema.antenna import Antenna, Isotropic
+from scenes.schema.materials import Slab
+from scenes.surfaces.tiled_faces import Reach
 from simulator.antennas import field_gain
 from simulator.facet_reflection import reflection_nodes
 from simulator.facets import Facets, scene_facets

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from estimator import engine
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import Facets
 
 mi.set_variant(engine.mitsuba_variant())

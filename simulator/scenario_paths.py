@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from scenes.antenna import Antenna
-from scenes.objects import Plate
+from scenes.realisations.object_surface import Surface
 from scenes.scenario import Scenario
-from scenes.shapes import Surface
+from scenes.schema.antenna import Antenna
+from scenes.schema.objects import Plate
 from simulator.antennas import field_gain
 from simulator.materials import Absorber
 from simulator.mean_surfaces import mean_mirrors, mean_surfaces

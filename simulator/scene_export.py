@@ -11,13 +11,13 @@ the meshes of the frozen scene.
 from collections.abc import Iterator
 from xml.etree import ElementTree
 
-from scenes.facet_spacing import facet_counts
-from scenes.ply_file import ply_bytes
-from scenes.relocatable import relocatable
+from scenes.files.relocatable import relocatable
+from scenes.files.toml_writer import toml_text
+from scenes.meshes.ply_writer import ply_bytes
+from scenes.realisations.object_surface import Surface, object_surface
+from scenes.realisations.surface_mesh import surface_to_mesh
 from scenes.scenario import Scenario
-from scenes.shapes import Surface, object_surface
-from scenes.surface_mesh import surface_to_mesh
-from scenes.toml_writer import toml_text
+from scenes.surfaces.facet_spacing import facet_counts
 from simulator.mean_surfaces import mean_surfaces, rms_height
 from simulator.radio_materials import sionna_slab
 from simulator.radio_scene import scenario_materials

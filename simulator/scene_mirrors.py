@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.scenario import Scenario
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.materials import Material
 from simulator.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.mirrors import Mirrors
@@ -79,7 +79,7 @@ def _size(scenario: Scenario, name: str) -> float:
         case Box():
             return max(body.length_m, body.depth_m, body.height_m or float("inf"))
         case MeshFile():
-            from scenes.mesh_file import placed_mesh
+            from scenes.meshes.mesh_file import placed_mesh
 
             bounds = np.asarray(placed_mesh(body).bounds)
             return float((bounds[1] - bounds[0]).max())

@@ -16,9 +16,9 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Bool, Float, Int
 
-from scenes.facet_spacing import FEWEST_ROUND
-from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.scenario import Scenario
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from scenes.surfaces.facet_spacing import FEWEST_ROUND
 from simulator.facets import Facets
 from simulator.mean_surfaces import mean_surfaces, rms_height
 from simulator.patch_sum import Seen

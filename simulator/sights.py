@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float
 
-from scenes.antenna import Antenna
 from scenes.scenario import Scenario
-from scenes.tiled_faces import Reach
+from scenes.schema.antenna import Antenna
+from scenes.surfaces.tiled_faces import Reach
 from simulator.antenna_pattern import ISOTROPIC, AntennaPattern
 from simulator.reach import Sight, in_reach
 from simulator.rough_legs import DIFFUSE_LEVEL, DiffuseLeg

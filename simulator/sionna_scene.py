@@ -9,8 +9,8 @@ import numpy as np
 import sionna.rt as rt
 from jaxtyping import Float
 
-from scenes.materials import Slab
 from scenes.scenario import Scenario
+from scenes.schema.materials import Slab
 from simulator.mean_surfaces import mean_surfaces, rms_height
 from simulator.radio_materials import ANGLE_OF_INCIDENCE, radio_material
 from simulator.radio_scene import scenario_materials

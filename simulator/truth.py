@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from scenes.mesh_file import placed_mesh
-from scenes.objects import Cylinder, MeshFile, Plate, SceneObject
+from scenes.meshes.mesh_file import placed_mesh
+from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
-from scenes.shapes import plate_segment
+from scenes.schema.objects import Cylinder, MeshFile, Plate, SceneObject
 
 
 class _Target(NamedTuple):

@@ -35,8 +35,8 @@ from typer.testing import CliRunner
 from mmslam.cli import app
 from mmslam.sweep_command import STORE
 from mmslam.sweep_mapping import load_mapping
-from scenes.library import load_scenario
-from scenes.toml_writer import toml_text
+from scenes.files.loading import load_scenario
+from scenes.files.toml_writer import toml_text
 from simulator.dataset import make_dataset, plan_dataset
 from simulator.resumable_work import Workers
 from validation.claims import ALL_CLAIMS

@@ -7,10 +7,10 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 from scipy.special import hankel2, jv, spherical_jn, spherical_yn
 
-from scenes.rough_surface import rough_sheet
+from scenes.realisations.object_surface import Surface
 from scenes.scenario import parse_scenario
-from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
+from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.roughness_spectrum import rough_sheet
 from simulator.facets import Facets, surface_facets
 from simulator.physical_optics import Ports, isotropic, scattered
 from simulator.radio_scene import RadioScene, radio_scene

@@ -26,9 +26,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from scenes.objects import Plate
+from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
-from scenes.shapes import plate_segment
+from scenes.schema.objects import Plate
 from simulator.materials import Absorber
 from simulator.radio_scene import scenario_materials
 

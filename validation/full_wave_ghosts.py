@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from estimator.measurement import MeasurementError
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import joined, profile_surface, surface_facets
 from simulator.ghost_echo import ghost_echo, scattering_faces
 from simulator.mutual_visibility import facets_see_each_other

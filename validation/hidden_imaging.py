@@ -14,8 +14,8 @@ from estimator.localization import locate
 from estimator.measurement import Echo, Measurement
 from estimator.projection import mirrored
 from estimator.resolution import cell_at
-from scenes.objects import Cylinder
 from scenes.scenario import Scenario
+from scenes.schema.objects import Cylinder
 from simulator.simulation import simulate
 from validation import figures, views
 from validation.claim import Row

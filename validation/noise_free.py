@@ -19,9 +19,9 @@ import numpy as np
 
 from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
 from estimator.storage import read_measurement, write_measurement
-from scenes.impairments import Impairments
-from scenes.library import scenario_to_toml
+from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Noise, Scenario
+from scenes.schema.impairments import Impairments
 from simulator.code_version import code_digest, package_versions
 from simulator.dataset_config import content_text
 from simulator.receiver import received

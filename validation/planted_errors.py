@@ -81,7 +81,7 @@ PLANTED = (
     ),
     PlantedError(
         name="facets as long as a wavelength",
-        file="scenes/facet_spacing.py",
+        file="scenes/surfaces/facet_spacing.py",
         right="FACETS_PER_CUTOFF)\n    return spacing",
         wrong="FACETS_PER_CUTOFF)\n    return shortest_wavelength",
         claims=("facet_grid",),

@@ -32,8 +32,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from scenes.antenna import Antenna
-from scenes.objects import Plate, Roughness
+from scenes.schema.antenna import Antenna
+from scenes.schema.objects import Plate, Roughness
 from simulator.antennas import field_gain
 from simulator.facet_reflection import facet_coefficients
 from simulator.materials import Material

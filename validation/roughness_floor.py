@@ -25,9 +25,9 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.signal import fftconvolve
 
-from scenes.objects import Plate, Roughness
+from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
-from scenes.shapes import plate_segment
+from scenes.schema.objects import Plate, Roughness
 from simulator.sights import array_sight, user_sight
 from validation.position_bound import (
     Plane,

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn
-from scenes.objects import Box, Cylinder, MeshFile, Plate
 from scenes.scenario import Scenario
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.scenario_paths import ScenarioPath
 from validation import figures, views
 
@@ -133,7 +133,7 @@ def outline(scenario: Scenario, name: str) -> Float[np.ndarray, "corners 3"]:
     """Return the corners of an object seen from above [m]."""
     body = scenario.objects[name]
     if isinstance(body, MeshFile):
-        from scenes.mesh_file import placed_mesh
+        from scenes.meshes.mesh_file import placed_mesh
 
         low, high = np.asarray(placed_mesh(body).bounds, dtype=np.float64)
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]

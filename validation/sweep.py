@@ -18,11 +18,11 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from estimator.estimate import Estimate, UserEstimate
-from scenes.library import ScenarioSource
-from scenes.objects import Plate
-from scenes.sample_space import SampleSpace, open_sample_space
+from scenes.files.loading import ScenarioSource
+from scenes.sampling.sample_space import SampleSpace, open_sample_space
+from scenes.sampling.variations import Variations, load_variations
 from scenes.scenario import Scenario
-from scenes.variations import Variations, load_variations
+from scenes.schema.objects import Plate
 from simulator.resumable_work import Result, Task, Workers, work_off
 from simulator.truth import scenario_truth
 from validation.echo_line_bound import wall_covariance_bound

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from scenes.sample_space import SampleSpace
+from scenes.sampling.sample_space import SampleSpace
 from validation.sweep import Outcome, SweepConfig
 
 COLUMNS = {

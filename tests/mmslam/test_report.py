@@ -9,7 +9,7 @@ from estimator.measurement import Measurement
 from mmslam.pictures import write_pictures
 from mmslam.report import radio_parameters, render_report
 from mmslam.result import result_document
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from validation.truth import Truth
 
 

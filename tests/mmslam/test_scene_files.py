@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mmslam.cli import app
-from scenes.library import scenario_names
+from scenes.files.loading import scenario_names
 
 
 def mmslam(*arguments: str) -> tuple[int, str, str]:

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator import antennas
 
 POLAR_NODES = np.polynomial.legendre.leggauss(400)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
+from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario, parse_scenario
-from scenes.shapes import Surface, object_surface
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas import field_gain
 from simulator.bistatic_kernel import BistaticKernel, Port, pattern_table, reflection_rows
 from simulator.facets import surface_facets

@@ -9,7 +9,7 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement import MeasurementError
 from estimator.storage import read_measurement
-from scenes.sample_space import SampleSpace
+from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import ScenarioError
 from simulator import dataset, dataset_layout, dataset_store
 from simulator.dataset import DatasetJob, forecast, make_dataset, plan_dataset

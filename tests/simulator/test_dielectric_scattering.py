@@ -7,9 +7,9 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
+from scenes.realisations.object_surface import Surface
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
-from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
+from scenes.surfaces.primitives import grid_triangles
 from simulator.facets import Facets, joined, profile_surface, surface_facets
 from simulator.materials import Absorber, Conductor, Dielectric, Material, reflection
 from simulator.mirrors import Mirrors

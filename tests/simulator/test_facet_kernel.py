@@ -7,9 +7,9 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from scenes.rough_surface import rough_sheet
-from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
+from scenes.realisations.object_surface import Surface
+from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.roughness_spectrum import rough_sheet
 from simulator import physical_optics
 from simulator.facets import Facets, joined, surface_facets
 from simulator.materials import Conductor, Dielectric, Material

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float
 
-from scenes.materials import MATERIALS
+from scenes.schema.materials import MATERIALS
 from simulator import materials
 from simulator.facet_reflection import (
     angle_class,

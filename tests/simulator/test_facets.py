@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float, Int
 
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import joined, profile_surface, surface_facets
 
 

@@ -10,7 +10,7 @@ from scipy.constants import speed_of_light
 
 from estimator import engine
 from estimator.measurement import Waves
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import Facets, joined, profile_surface, surface_facets
 from simulator.few_frequencies import CHAIN_ACCURACY, nodes_for_chain
 from simulator.frequency_sum import chebyshev_nodes, lagrange_basis

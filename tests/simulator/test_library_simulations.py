@@ -15,10 +15,10 @@ import sionna.rt as rt
 
 from estimator import engine
 from estimator.storage import write_measurement
-from scenes.facet_spacing import facet_count, mesh_facet_count
-from scenes.library import load_scenario, scenario_names
-from scenes.mesh_file import placed_mesh
+from scenes.files.loading import load_scenario, scenario_names
+from scenes.meshes.mesh_file import placed_mesh
 from scenes.scenario import MeshFile, Scenario
+from scenes.surfaces.facet_spacing import facet_count, mesh_facet_count
 from simulator.scene_export import exported_files
 from simulator.simulation import simulate
 
@@ -29,7 +29,7 @@ from estimator import engine
 engine.backend()
 dr.set_thread_count(int(sys.argv[1]))
 from estimator.storage import write_measurement
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 made = simulate(load_scenario(sys.argv[2], sys.argv[4:]), seed=7)
 write_measurement(sys.argv[3], made.measurement, truth=made.truth)

@@ -8,7 +8,7 @@ from scipy.constants import speed_of_light
 from scipy.special import hankel2
 
 from estimator import engine
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import profile_surface
 from simulator.free_space import direct_wave
 from simulator.line_of_sight import in_line_of_sight

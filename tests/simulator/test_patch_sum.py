@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from jaxtyping import Int
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
-from scenes.rough_surface import rough_sheet
-from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
+from scenes.realisations.object_surface import Surface
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
+from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.roughness_spectrum import rough_sheet
 from simulator.antenna_pattern import AntennaPattern
 from simulator.facets import Facets, joined, surface_facets
 from simulator.materials import Conductor, Dielectric, Material

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from scipy.special import hankel2
 
 from estimator.measurement import Waves
-from scenes.rough_surface import rough_profile
-from scenes.shapes import Surface
-from scenes.upright_shapes import grid_triangles
+from scenes.realisations.object_surface import Surface
+from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.roughness_spectrum import rough_profile
 from simulator.facets import Facets, profile_surface, surface_facets
 from simulator.physical_optics import Pattern, Ports, facet_transform, scattered
 

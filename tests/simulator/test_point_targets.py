@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import ScenarioError
 from simulator.simulation import simulate
 from validation.point_scatterer import point_echo

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy.constants import speed_of_light
 
-from scenes.shapes import Surface
+from scenes.realisations.object_surface import Surface
 from simulator.facets import surface_facets
 from simulator.physical_optics import scattered
 from simulator.ray_scene import facets_visible

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import Bool, Float
 
-from scenes.rough_surface import rough_profile
+from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import parse_scenario
-from scenes.shapes import Surface, object_surface
+from scenes.surfaces.roughness_spectrum import rough_profile
 from simulator.facets import Facets, profile_surface, surface_facets
 from simulator.ray_scene import CLEARANCE, blocked, build_scene, facets_visible
 

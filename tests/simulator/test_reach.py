@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes.antenna import Isotropic
 from scenes.scenario import Scenario, parse_scenario
+from scenes.schema.antenna import Isotropic
 from simulator.links_in_space import scattered_in_space, sightlines
 from simulator.physical_optics import Ports, scattered
 from simulator.radio_scene import RadioScene, radio_scene

@@ -7,7 +7,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.measurement import Measurement
-from scenes.library import override_scenario
+from scenes.files.loading import override_scenario
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.simulation import simulate
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.radio_scene import scenario_materials

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import sionna.rt as rt
 
-from scenes.library import load_scenario
-from scenes.ply_file import ply_bytes
+from scenes.files.loading import load_scenario
+from scenes.meshes.ply_writer import ply_bytes
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.mean_surfaces import mean_surfaces
 from simulator.radio_materials import scattering_coefficient

@@ -5,7 +5,7 @@ import pytest
 import sionna.rt as rt
 from scipy.constants import speed_of_light
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.mean_surfaces import mean_surfaces
 from simulator.permittivity import MaterialError

@@ -7,7 +7,7 @@ import pytest
 
 from estimator.measurement import Measurement, Uplink
 from estimator.storage import write_measurement
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.truth import scenario_truth
 from validation.truth import Truth, front_face, read_truth

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from scenes.library import load_scenario
-from scenes.rough_surface import rough_profile
+from scenes.files.loading import load_scenario
+from scenes.surfaces.roughness_spectrum import rough_profile
 from validation.echo_line_bound import (
     line_covariance,
     noise_depth_deviation,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from scenes.library import load_scenario
-from scenes.shapes import object_surface
+from scenes.files.loading import load_scenario
+from scenes.realisations.object_surface import object_surface
 from validation.experiments.full_wave_localization import (
     CASES,
     HALF_SIZE,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from matplotlib.figure import Figure
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from validation.experiments import fig02_10_nlos_posts, fig02_11_nlos_box
 from validation.hidden_imaging import HiddenImaging, draw_hidden, hidden_rows, measure_hidden
 

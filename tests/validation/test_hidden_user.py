@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from validation.experiments import fig04_09_slam_2d, fig04_14_lab_two_walls
 from validation.experiments.fig04_09_slam_2d import Slam2d
 from validation.hidden_user import UserTrial, hidden_user, map_cuts

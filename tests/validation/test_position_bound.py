@@ -7,7 +7,7 @@ from jaxtyping import Complex, Float
 
 from estimator.measurement import Uplink
 from estimator.peaks import refine_paths
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.cramer_rao import cramer_rao_bound
 from validation.point_scatterer import complex_noise, point_uplink

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from scenes.library import load_scenario
-from scenes.objects import Plate, Roughness
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
+from scenes.schema.objects import Plate, Roughness
 from simulator.antennas import horn_beam_width
 from simulator.materials import Conductor
 from simulator.radio_scene import scenario_materials

@@ -4,9 +4,9 @@ from jaxtyping import Float
 
 from estimator.measurement import Uplink
 from estimator.peaks import refine_paths
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
+from scenes.realisations.object_surface import object_surface, plate_segment
 from scenes.scenario import Scenario
-from scenes.shapes import object_surface, plate_segment
 from simulator.radio_scene import facet_ports, radio_scene
 from simulator.uplink import simulate_uplink
 from validation.roughness_floor import roughness_floor

@@ -4,8 +4,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from scipy.optimize import brentq
 
-from scenes.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
+from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas import field_gain
 from validation.scenario_plan import draw_scenario, half_power_width, outline
 

@@ -2,7 +2,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import parse_scenario
 from simulator.scenario_paths import scenario_paths
 from validation.scenario_plan import FAINT_DB, draw_scenario, path_style

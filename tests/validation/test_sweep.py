@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import ScenarioError
 from simulator.resumable_work import Workers
 from simulator.simulation import simulate

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from scenes.radio import Radio
+from scenes.schema.radio import Radio
 from validation.baselines.arrivals import plane_wave_angle, strength_db
 from validation.baselines.room import ANCHORS, Fix, Room
 

@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from estimator.measurement import Uplink
-from scenes.base_station import BaseStation
-from scenes.radio import Radio
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario
+from scenes.schema.base_station import BaseStation
+from scenes.schema.radio import Radio
 from simulator.physical_optics import Ports
 from simulator.radio_scene import RadioScene, facet_ports, radio_scene
 from simulator.uplink import simulate_uplink

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.constants import speed_of_light
 
-from scenes.radio import Radio
+from scenes.schema.radio import Radio
 from validation.baselines.arrivals import first_arrival, plane_wave_angle
 from validation.baselines.room import Fix, Room
 

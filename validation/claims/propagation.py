@@ -5,9 +5,9 @@ from jaxtyping import Complex
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario
-from scenes.shapes import object_surface
 from simulator.facets import surface_facets
 from simulator.materials import Dielectric, reflection, transmission
 from simulator.permittivity import ConstantPermittivity

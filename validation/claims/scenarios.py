@@ -12,7 +12,7 @@ from scipy.stats import beta, chi2, norm
 from estimator.estimate import Estimate
 from estimator.localization import locate
 from estimator.measurement import Measurement
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import position_errors
 from validation.claim import Claim, Effort, Finding, Row, Tell

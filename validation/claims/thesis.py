@@ -4,7 +4,7 @@ from types import ModuleType
 
 from matplotlib.figure import Figure
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import (
     eq02_design_numbers,

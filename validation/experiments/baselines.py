@@ -30,7 +30,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from estimator.localization import locate
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.baselines.angle_difference import angle_difference
 from validation.baselines.fingerprinting import fingerprinting

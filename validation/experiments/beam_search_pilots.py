@@ -51,7 +51,7 @@ from scipy.constants import speed_of_light
 from estimator.predicted_channel import predict_channel
 from estimator.projection import Wall, mirrored
 from estimator.room_map import build_room_map
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.point_scatterer import complex_noise
 

@@ -32,7 +32,7 @@ from estimator.estimate import Estimate, UserEstimate
 from estimator.localization import locate
 from estimator.measurement import Uplink
 from estimator.projection import Wall
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 
 ANGLES_DEG = (45.0, 35.0)

@@ -35,9 +35,9 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 from matplotlib.axes import Axes
 
-from scenes.library import load_scenario, override_scenario
-from scenes.objects import Plate
+from scenes.files.loading import load_scenario, override_scenario
 from scenes.scenario import Scenario
+from scenes.schema.objects import Plate
 from simulator.radio_scene import scenario_materials
 from simulator.simulation import simulate
 from validation.claim import Row, Tell

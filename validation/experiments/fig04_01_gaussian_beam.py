@@ -28,8 +28,8 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from scenes.antenna import GaussianBeam
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
+from scenes.schema.antenna import GaussianBeam
 from simulator.simulation import simulate
 from validation.claim import Row
 from validation.point_response import peak_cut

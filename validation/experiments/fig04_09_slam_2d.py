@@ -31,7 +31,7 @@ from scipy.constants import speed_of_light
 from estimator.measurement import Uplink
 from estimator.resolution import angular_resolution
 from estimator.steering import angle_spectrum
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from validation import figures, views
 from validation.claim import Row, Tell
 from validation.hidden_user import (

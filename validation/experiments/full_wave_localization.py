@@ -35,11 +35,11 @@ from scipy.stats import chi2
 
 from estimator.localization import locate
 from estimator.measurement import Echo, Measurement, Uplink
-from scenes.antenna import GaussianBeam
-from scenes.library import load_scenario, override_scenario
-from scenes.objects import Plate
+from scenes.files.loading import load_scenario, override_scenario
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario
-from scenes.shapes import object_surface
+from scenes.schema.antenna import GaussianBeam
+from scenes.schema.objects import Plate
 from simulator.receiver import received
 from simulator.simulation import simulate
 from simulator.truth import scenario_truth

@@ -63,9 +63,9 @@ from matplotlib.patches import Rectangle
 
 from estimator.backprojection import backproject
 from estimator.measurement import Echo
-from scenes.library import load_scenario
-from scenes.objects import Plate
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
+from scenes.schema.objects import Plate
 from simulator.simulation import simulate
 from validation.experiments.full_wave_localization import USER, WALL, strip_scene
 from validation.full_wave_band import band_fields

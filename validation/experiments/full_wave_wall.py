@@ -27,7 +27,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.special import hankel2, jv
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from validation.conducting_contour import circle
 from validation.experiments.full_wave_localization import USER, WALL, strip_scene

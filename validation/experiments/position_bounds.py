@@ -40,7 +40,7 @@ from matplotlib.ticker import NullLocator
 from estimator.localization import locate
 from estimator.measurement import Uplink
 from estimator.peaks import extract_paths
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from simulator.radio_scene import facet_ports, radio_scene
 from simulator.simulation import simulate

@@ -31,7 +31,7 @@ from scipy.special import hankel2
 from estimator.backprojection import backproject
 from estimator.measurement import Waves
 from estimator.resolution import HALF_POWER, cell_at, range_resolution
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.claim import Row
 from validation.point_response import peak_cut

@@ -23,7 +23,7 @@ from scipy.stats import chi2, norm
 
 from estimator.estimate import Estimate, Mirror
 from estimator.localization import locate
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import position_errors
 from validation.metrics import distances_from_segment, nearest_wall, wall_error

@@ -23,7 +23,7 @@ from scipy.stats import chi2
 
 from estimator.estimate import Mirror
 from estimator.localization import locate
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import coverage, normalised_square
 from validation.claim import Tell

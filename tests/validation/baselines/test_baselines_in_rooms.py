@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scenes.library import load_scenario
+from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from simulator.simulation import simulate
 from validation.baselines.room import Anchor, Room

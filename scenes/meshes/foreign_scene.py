@@ -1,0 +1,150 @@
+"""The table [geometry]: a foreign scene's meshes as objects, their materials given by name."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError
+
+from scenes.meshes.mitsuba_xml import ForeignMaterial, ForeignShape, read_mitsuba_xml
+from scenes.schema.errors import ScenarioError, did_you_mean, problems
+from scenes.schema.materials import MATERIALS, SLABS, usual_texture
+from scenes.schema.quantities import Checked
+
+_THE_FILES = ("kind", "file", "matrix", "facets")  # keys of an object that the file decides
+
+
+class Geometry(Checked):
+    """A foreign scene's meshes; its materials and shapes are given what they are made of."""
+
+    file: str = Field(
+        min_length=1, description="the Mitsuba or Sionna XML file, relative to the scenario's"
+    )
+    facets: Literal["cut", "file"] = Field(
+        "cut", description="'cut' its triangles until they are fine enough, or 'file': as they are"
+    )
+    materials: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="by the name of a material of the file: keys of an object, such as material "
+        "and roughness",
+    )
+    objects: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="by the name of a shape of the file: the same, for this shape alone",
+    )
+
+
+def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
+    """Replace a scenario's table [geometry] by an object of kind 'mesh' for each of its shapes.
+
+    A material of the ITU-R P.2040 keeps its name and thickness unless told otherwise; for all
+    others the table says what they are. What was told about a shape goes before what was told
+    about its material.
+
+    Parameters
+    ----------
+    data
+        Nested tables, as a TOML file holds them; without [geometry] they stay as they are.
+
+    Raises
+    ------
+    ScenarioError
+        If the table or its file cannot be read, a name in the table is not one of the file, a
+        material is not given, or a shape has the name of another object.
+    """
+    plain = dict(data)
+    table = plain.pop("geometry", None)
+    if table is None:
+        return plain
+    try:
+        geometry = Geometry.model_validate(table)
+    except ValidationError as error:
+        lines = (
+            f"geometry.{line}" if not line.startswith(":") else f"geometry{line}"
+            for line in problems(error, Geometry)
+        )
+        raise ScenarioError("\n".join(lines)) from None
+    try:
+        shapes = read_mitsuba_xml(Path(geometry.file))
+    except ScenarioError as error:
+        raise ScenarioError(f"geometry.file: {error}") from None
+    own = plain.get("objects", {})
+    if not isinstance(own, Mapping):  # the scenario's own check says so
+        return plain
+    found = [*_unknown(geometry, shapes), *_clashes(shapes, own)]
+    objects: dict[str, object] = {}
+    for shape in shapes:
+        body = _body(geometry, shape)
+        if "material" not in body:
+            name = shape.material.name
+            found.append(
+                f"geometry.materials.{name}.material: missing (for shape {shape.name!r}); give one "
+                f"of {', '.join(MATERIALS)}, or a table"
+                if name
+                else f"geometry.objects.{shape.name}.material: missing, and the file gives the "
+                f"shape none; give one of {', '.join(MATERIALS)}, or a table"
+            )
+        objects[shape.name] = body
+    if found:
+        raise ScenarioError("\n".join(dict.fromkeys(found)))
+    return {**plain, "objects": {**objects, **own}}
+
+
+def _unknown(geometry: Geometry, shapes: tuple[ForeignShape, ...]) -> list[str]:
+    tables = {
+        "materials": (geometry.materials, [shape.material.name for shape in shapes]),
+        "objects": (geometry.objects, [shape.name for shape in shapes]),
+    }
+    found = []
+    for table, (given, known) in tables.items():
+        for name, keys in given.items():
+            place = f"geometry.{table}.{name}"
+            if name not in known:
+                listed = ", ".join(dict.fromkeys(word for word in known if word)) or "none"
+                found.append(
+                    f"{place}: no such name in {geometry.file!r}{did_you_mean(name, known)}; "
+                    f"known: {listed}"
+                )
+            found += [
+                f"{place}.{key}: is decided by the file; remove it"
+                for key in _THE_FILES
+                if key in keys
+            ]
+    return found
+
+
+def _clashes(shapes: tuple[ForeignShape, ...], own: Mapping[str, object]) -> list[str]:
+    return [
+        f"objects.{shape.name}: a shape of geometry.file has this name, too; rename the object"
+        for shape in shapes
+        if shape.name in own
+    ]
+
+
+def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
+    body: dict[str, object] = {
+        **_itu(shape.material),
+        **geometry.materials.get(shape.material.name, {}),
+        **geometry.objects.get(shape.name, {}),
+        "kind": "mesh",
+        "file": str(shape.file),
+        "facets": geometry.facets,
+    }
+    if not (shape.to_world == [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]).all():
+        body["matrix"] = [float(entry) for entry in shape.to_world.ravel()]
+    frozen = geometry.facets == "file" and "roughness" not in body
+    if frozen and usual_texture(body.get("material")) is not None:
+        # Its roughness is in its facets; without this it would get its material's usual one.
+        body["roughness"] = {"rms_mm": 0.0, "correlation_mm": 1.0}
+    return body
+
+
+def _itu(material: ForeignMaterial) -> dict[str, object]:
+    name = material.itu_type
+    if name == "metal":
+        return {"material": "metal"}
+    if name not in SLABS:
+        return {}
+    if material.thickness is None:
+        return {"material": name}
+    return {"material": {"name": name, "thickness_mm": material.thickness * 1e3}}
