@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator import engine
-from estimator.backprojection import backproject
-from estimator.measurement import Echo
-from estimator.pixel_grid import PixelGrid
+from estimator.compute import engine
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Echo
+from estimator.results.pixel_grid import PixelGrid
 
 REPEATS = 7
 SUBSET = 200  # pixels that the direct sum is taken on

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from estimator import engine  # chooses the LLVM that Dr.Jit loads when it is imported
+from estimator.compute import engine  # chooses the LLVM that Dr.Jit loads when it is imported
 
 # isort: split
 import drjit as dr

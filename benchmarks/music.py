@@ -11,10 +11,10 @@ import time
 import numpy as np
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Uplink
-from estimator.music import music_spectrum
-from estimator.peaks import refine_paths
-from estimator.steering import angle_spectrum
+from estimator.channel.music import music_spectrum
+from estimator.channel.relax import refine_paths
+from estimator.channel.steering import angle_spectrum
+from estimator.measurement.model import Uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 65)
 

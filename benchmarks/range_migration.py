@@ -12,11 +12,12 @@ import scipy.fft
 from scipy.constants import speed_of_light
 
 from benchmarks.backprojection import decibels, echo_of_targets, fastest
-from estimator import engine, range_migration
-from estimator.angle_range_map import angle_range_map
-from estimator.backprojection import backproject
-from estimator.measurement import Echo, Uplink
-from estimator.pixel_grid import PixelGrid
+from estimator.channel.angle_range_map_2d import angle_range_map
+from estimator.compute import engine
+from estimator.imaging import range_migration
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Echo, Uplink
+from estimator.results.pixel_grid import PixelGrid
 
 
 def linear() -> None:

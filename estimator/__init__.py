@@ -17,6 +17,6 @@ symbol             name                    unit
 =================  ======================  =====
 """
 
-from estimator import engine
+from estimator.compute import engine
 
 engine.prepare()

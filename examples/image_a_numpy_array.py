@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.constants import speed_of_light
 
-from estimator.backprojection import backproject
-from estimator.measurement import Echo
-from estimator.pixel_grid import PixelGrid
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Echo
+from estimator.results.pixel_grid import PixelGrid
 
 frequencies = np.linspace(220e9, 295e9, 301)  # [Hz]
 positions = np.stack([np.linspace(-0.065, 0.065, 261), np.zeros(261), np.zeros(261)], axis=1)

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from estimator.storage import measurement_to_dataset
+from estimator.measurement.store import measurement_to_dataset
 from mmslam.moving_users import track_store
 from scenes.files.loading import load_scenario
 from scenes.scenario import parse_scenario

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.csv_columns import CsvGrid, read_csv_grid
 from mmslam.hdf5_files import hdf5_array, is_hdf5
 from mmslam.matlab_files import matlab_array

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 COMMENT = "#"
 DELIMITERS = ",;\t"

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import zarr
 
-from estimator.measurement import MeasurementError
-from estimator.storage import is_store
+from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import is_store
 from mmslam.output import OutputError
 
 SAMPLES_AT_ONCE = 64

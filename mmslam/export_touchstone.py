@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from estimator.measurement import Echo, Measurement, Uplink
+from estimator.measurement.model import Echo, Measurement, Uplink
 from mmslam.touchstone_files import touchstone_text
 from mmslam.touchstone_folder import COORDINATES, TRANSMIT_COORDINATES
 from scenes.files.toml_writer import toml_text

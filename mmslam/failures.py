@@ -55,8 +55,8 @@ def _say(message: str) -> None:
 
 def _users_errors() -> tuple[type[Exception], ...]:
     # Imported here: only a failure pays for pydantic and jaxtyping.
-    from estimator.engine import EngineError
-    from estimator.measurement import MeasurementError
+    from estimator.compute.engine import EngineError
+    from estimator.measurement.model import MeasurementError
     from mmslam.output import OutputError
     from scenes.scenario import ScenarioError
 

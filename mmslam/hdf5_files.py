@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 

@@ -1,7 +1,8 @@
 """Measured data of any layout becomes a measurement, told by a mapping file what is what.
 
 The order of the steps: read; bring to exp(+jωt); subtract the background; divide the radio's
-response out; take the cables' delay out. The steps are those of :mod:`estimator.calibration`.
+response out; take the cables' delay out. The steps are those of
+:mod:`estimator.measurement.calibration`.
 """
 
 from dataclasses import dataclass, replace
@@ -11,8 +12,8 @@ from typing import TypeVar
 import numpy as np
 from scipy.constants import speed_of_light
 
-from estimator.calibration import equalise, remove_path, subtract_background
-from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.calibration import equalise, remove_path, subtract_background
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from mmslam.measured_signals import (
     ArrayReader,
     FolderReader,

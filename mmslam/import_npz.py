@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Complex, Float
 
-from estimator.measurement import Echo, Measurement, MeasurementError, Uplink, frequency_step
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink, frequency_step
 from mmslam.numpy_files import npz_arrays
 
 PREFERRED_UPLINK = "uplink_beam"

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.array_files import ArrayFiles, is_csv
 from mmslam.sweep_mapping import (
     FREQUENCY,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.hdf5_files import hdf5_array, is_hdf5
 
 _INTEGERS = ("int8", "int16", "int32", "int64")

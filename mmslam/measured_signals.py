@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import MeasurementError, frequency_step
+from estimator.measurement.model import MeasurementError, frequency_step
 from mmslam.array_files import ArrayFiles
 from mmslam.mapped_arrays import array_frequencies, array_positions, array_samples
 from mmslam.plausibility import check_frequencies, check_positions, check_samples

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from estimator.estimate import Progress
-from estimator.measurement import Measurement
-from estimator.storage import read_measurement, write_measurement
+from estimator.measurement.model import Measurement
+from estimator.measurement.store import read_measurement, write_measurement
+from estimator.results.estimate import Progress
 from mmslam import output
 from mmslam.export_touchstone import MAPPING, export_touchstone, refuse_foreign_touchstone
 from mmslam.import_measured import Import, import_measured

@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from zarr.storage import LocalStore
 
-from estimator.estimate import Estimate, Progress, UserEstimate
-from estimator.localization import locate
-from estimator.measurement import MeasurementError
-from estimator.storage import is_store, read_measurement
-from estimator.tracking import ACCELERATION, Track, fix, track
+from estimator.localization.locate import locate
+from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import is_store, read_measurement
+from estimator.results.estimate import Estimate, Progress, UserEstimate
+from estimator.tracking.multi_hypothesis import ACCELERATION, Track, fix, track
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 LARGEST = 2**28
 """Most values of all arrays that are read, unless told otherwise."""

@@ -8,8 +8,8 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from estimator.estimate import Estimate, Image
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate, Image
 from mmslam import output, pictures_3d
 from validation import figures, views
 from validation.resolution_bars import draw_resolution_bars

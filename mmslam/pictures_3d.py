@@ -5,7 +5,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from estimator.estimate import Estimate, Image
+from estimator.results.estimate import Estimate, Image
 from validation import figures, figures_3d, views
 from validation.truth import Truth
 

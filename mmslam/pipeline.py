@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimator.estimate import Estimate, Progress
-from estimator.localization import locate
-from estimator.measurement import Measurement
-from estimator.storage import read_measurement, write_measurement
+from estimator.localization.locate import locate
+from estimator.measurement.model import Measurement
+from estimator.measurement.store import read_measurement, write_measurement
+from estimator.results.estimate import Estimate, Progress
 from mmslam import output
 from mmslam.measurement_files import simulate_interruptibly
 from mmslam.result import result_document, to_json

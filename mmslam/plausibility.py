@@ -5,7 +5,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.spatial import cKDTree
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 LOWEST, HIGHEST = 1e9, 1e13
 """Frequencies of radios that measure rooms to millimetres: 220 in GHz, taken for Hz, lies far

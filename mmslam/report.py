@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
 from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Scenario
 

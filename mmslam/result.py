@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from estimator import engine
-from estimator.estimate import Estimate, Mirror, Target, UserEstimate
-from estimator.measurement import Measurement
+from estimator.compute import engine
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
 from mmslam.output import FORMAT
 from validation.metrics import WallError, position_error, wall_errors
 from validation.truth import Truth

@@ -5,7 +5,7 @@ from math import degrees, sqrt
 from pathlib import Path
 from typing import Any
 
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
 from mmslam import output
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from estimator.storage import is_store
+from estimator.measurement.store import is_store
 from mmslam import output
 from mmslam.interruption import ResumableInterruption, interruptions_held
 from mmslam.work_progress import WorkProgress, told_time

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.file_pattern import fields_of_pattern
 from scenes.schema.errors import problems
 from scenes.schema.quantities import Checked

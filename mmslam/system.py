@@ -5,7 +5,7 @@ import platform
 import re
 from typing import Any
 
-from estimator import engine
+from estimator.compute import engine
 from mmslam.result import versions
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 SUFFIX = re.compile(r"\.(s[1-9]\d?p|ts)$", re.IGNORECASE)
 """Of files that hold S-parameters."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.file_pattern import expression_of_pattern, fields_of_pattern
 from mmslam.sweep_mapping import LENGTH_UNITS, PositionTable
 from mmslam.touchstone_files import SUFFIX, Sweep, read_touchstone

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from estimator.estimate import Mirror, Progress
-from estimator.storage import read_measurement
-from estimator.tracking import ACCELERATION, TrackPoint
+from estimator.measurement.store import read_measurement
+from estimator.results.estimate import Mirror, Progress
+from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
 from mmslam import output
 from mmslam.moving_users import MovingUser, track_store
 from mmslam.result import plain, to_json, versions

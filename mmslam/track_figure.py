@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from estimator.estimate import Mirror
+from estimator.results.estimate import Mirror
 from mmslam.moving_users import MovingUser
 from validation import figures, views
 

@@ -1,6 +1,6 @@
 """The ray-traced forward model: from a scenario to the measurement of it."""
 
-from estimator import engine
+from estimator.compute import engine
 
 # Sionna aborts the whole process on an LLVM that is too old, so ask first.
 engine.backend()

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Float32
 from scipy.constants import speed_of_light
 
-from estimator import engine
+from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from scenes.schema.antenna import Antenna, Isotropic
 from simulator.antennas import field_gain

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import zarr
 
-from estimator.storage import PARAMETERS
+from estimator.measurement.store import PARAMETERS
 from scenes.files.loading import ScenarioSource
 from scenes.sampling.sample_space import SampleSpace, open_sample_space
 from scenes.sampling.variations import load_variations

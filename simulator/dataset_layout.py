@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from estimator.measurement import Measurement
-from estimator.storage import CONVENTIONS, PARAMETERS, TRUTH
-from estimator.storage import FORMAT as MEASUREMENT_FORMAT
+from estimator.measurement.model import Measurement
+from estimator.measurement.store import CONVENTIONS, PARAMETERS, TRUTH
+from estimator.measurement.store import FORMAT as MEASUREMENT_FORMAT
 from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import Scenario
 from scenes.schema.errors import ScenarioError

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Measurement
-from estimator.storage import PARAMETERS, TRUTH
+from estimator.measurement.model import Measurement
+from estimator.measurement.store import PARAMETERS, TRUTH
 from scenes.sampling.drawn_parameters import Parameter
 from scenes.sampling.sample_space import Attempt, SampleSpace, impossible_sample
 from scenes.scenario import Scenario, ScenarioError

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from estimator.storage import PARAMETERS, TRUTH
+from estimator.measurement.store import PARAMETERS, TRUTH
 from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import Scenario
 from simulator.dataset_config import DatasetConfig

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator import engine
+from estimator.compute import engine
 from simulator.facets import Facets
 from simulator.frequency_sum import FrequencySum
 

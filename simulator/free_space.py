@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Waves
+from estimator.measurement.model import Waves
 
 
 def direct_wave(

@@ -28,8 +28,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 
-from estimator.engine import thread_count
-from estimator.measurement import Waves
+from estimator.compute.engine import thread_count
+from estimator.measurement.model import Waves
 from simulator.facets import Facets
 from simulator.few_frequencies import EveryFrequency, FewFrequencies, few_frequencies
 from simulator.one_way_field import (

@@ -27,7 +27,7 @@ from jaxtyping import Bool, Complex64, Float, Float32, Int
 from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
-from estimator.engine import thread_count
+from estimator.compute.engine import thread_count
 from simulator.block_links import LinkPlan, phasor, plan_links, sum_planned
 from simulator.facets import Facets
 from simulator.materials import Material

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Float
 from scipy.constants import speed_of_light
 
-from estimator import engine
+from estimator.compute import engine
 from simulator.antenna_pattern import AntennaPattern
 from simulator.frequency_sum import chebyshev_nodes, lagrange_basis
 from simulator.materials import Conductor, Material, reflection

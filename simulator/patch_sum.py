@@ -9,7 +9,7 @@ from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
-from estimator.engine import thread_count
+from estimator.compute.engine import thread_count
 from simulator.facet_reflection import echo_coefficient, reflection_nodes
 from simulator.facets import Facets
 from simulator.few_positions import GAIN, Aperture, find_aperture, node_counts

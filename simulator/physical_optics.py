@@ -25,8 +25,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.engine import thread_count
-from estimator.measurement import Waves
+from estimator.compute.engine import thread_count
+from estimator.measurement.model import Waves
 from simulator.facet_reflection import (
     angle_class,
     echo_coefficient,

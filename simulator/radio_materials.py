@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from scipy.constants import speed_of_light
 
-from estimator import engine
+from estimator.compute import engine
 from simulator.materials import Absorber, Conductor, Dielectric, Material
 from simulator.permittivity import MaterialError, conductivity
 

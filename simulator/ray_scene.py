@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 from jaxtyping import Bool, Float
 
-from estimator import engine
+from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from simulator.facets import Facets
 

@@ -234,7 +234,7 @@ def dask_setup(worker: Any) -> None:
 @functools.cache
 def compute_in_one_thread() -> None:
     """Compute in one thread: Dr.Jit takes all cores in every worker else."""
-    from estimator import engine
+    from estimator.compute import engine
 
     if engine.backend() == "llvm":
         import drjit as dr

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from estimator.measurement import Echo, Measurement, Uplink
+from estimator.measurement.model import Echo, Measurement, Uplink
 from scenes.scenario import Scenario
 from simulator.echo import simulate_echo
 from simulator.multistatic import multistatic_echo, multistatic_scene

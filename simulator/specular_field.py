@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Waves
+from estimator.measurement.model import Waves
 from simulator import materials
 from simulator.free_space import direct_wave
 from simulator.mirrors import Mirrors, dot

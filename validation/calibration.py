@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import beta, chi2
 
-from estimator.estimate import UserEstimate
+from estimator.results.estimate import UserEstimate
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,8 @@
 """What the thesis' design equations say of its radio, and what is measured of that on points.
 
-Each number is theory's (:mod:`estimator.resolution`, :mod:`estimator.field_regions`) beside one
-that comes from the response of imaging and matched filter to one ideal point, in closed form, or
-from the phases of that closed form.
+Each number is theory's (:mod:`estimator.array.resolution`, :mod:`estimator.array.field_regions`)
+beside one that comes from the response of imaging and matched filter to one ideal point, in closed
+form, or from the phases of that closed form.
 """
 
 from dataclasses import dataclass
@@ -11,9 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.backprojection import backproject, focus_uplink
-from estimator.field_regions import far_field_distance, fresnel_distance
-from estimator.resolution import (
+from estimator.array.field_regions import far_field_distance, fresnel_distance
+from estimator.array.resolution import (
     HALF_POWER,
     angular_resolution,
     cross_range_resolution,
@@ -21,7 +20,8 @@ from estimator.resolution import (
     range_resolution,
     unambiguous_range,
 )
-from estimator.steering import angle_spectrum
+from estimator.channel.steering import angle_spectrum
+from estimator.imaging.backprojection import backproject, focus_uplink
 from validation.point_response import PeakCut, peak_cut
 from validation.point_scatterer import point_echo, point_uplink
 

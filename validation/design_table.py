@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.constants import speed_of_light
 
-from estimator.field_regions import (
+from estimator.array.field_regions import (
     curvature,
     far_field_distance,
     field_region,
     fresnel_distance,
 )
-from estimator.measurement import MeasurementError
-from estimator.resolution import (
+from estimator.array.resolution import (
     cross_range_resolution,
     largest_frequency_step,
     largest_spacing,
@@ -20,6 +19,7 @@ from estimator.resolution import (
     unaliased_sine,
     unambiguous_range,
 )
+from estimator.measurement.model import MeasurementError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Ellipse
 from matplotlib.ticker import MaxNLocator
 
-from estimator.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
+from estimator.results.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
 from validation.views import View, brightest_plane
 
 FLOOR_DB = -40.0

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from estimator.estimate import DirectionMap, Estimate, Image, UserEstimate
+from estimator.results.estimate import DirectionMap, Estimate, Image, UserEstimate
 from validation import figures
 
 AXES = ("x", "y", "z")

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from scenes.realisations.object_surface import Surface
 from simulator.facets import joined, profile_surface, surface_facets
 from simulator.ghost_echo import ghost_echo, scattering_faces

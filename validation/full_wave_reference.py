@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from simulator.facets import profile_surface, surface_facets
 from simulator.physical_optics import Pattern, Ports, isotropic, scattered
 from simulator.ray_scene import build_scene, facets_visible

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from estimator.estimate import Estimate, Image
-from estimator.localization import locate
-from estimator.measurement import Echo, Measurement
-from estimator.projection import mirrored
-from estimator.resolution import cell_at
+from estimator.array.resolution import cell_at
+from estimator.geometry.path_tracing_2d import mirrored
+from estimator.localization.locate import locate
+from estimator.measurement.model import Echo, Measurement
+from estimator.results.estimate import Estimate, Image
 from scenes.scenario import Scenario
 from scenes.schema.objects import Cylinder
 from simulator.simulation import simulate

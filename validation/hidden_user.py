@@ -9,12 +9,12 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from scipy.constants import speed_of_light
 
-from estimator.angle_range_map import angle_range_map
-from estimator.estimate import Estimate, Mirror, UserEstimate
-from estimator.localization import locate
-from estimator.measurement import Measurement, Uplink
-from estimator.projection import mirrored
-from estimator.resolution import angular_resolution, range_resolution
+from estimator.array.resolution import angular_resolution, range_resolution
+from estimator.channel.angle_range_map_2d import angle_range_map
+from estimator.geometry.path_tracing_2d import mirrored
+from estimator.localization.locate import locate
+from estimator.measurement.model import Measurement, Uplink
+from estimator.results.estimate import Estimate, Mirror, UserEstimate
 from scenes.scenario import Scenario
 from simulator.simulation import simulate
 from validation import figures, views

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from estimator.estimate import Image
+from estimator.results.estimate import Image
 
 
 @dataclass(frozen=True, kw_only=True)

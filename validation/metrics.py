@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from estimator.estimate import Mirror
+from estimator.results.estimate import Mirror
 from validation.truth import Truth
 
 

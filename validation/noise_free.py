@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.measurement import Echo, Measurement, MeasurementError, Uplink
-from estimator.storage import read_measurement, write_measurement
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.store import read_measurement, write_measurement
 from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Noise, Scenario
 from scenes.schema.impairments import Impairments

@@ -45,7 +45,7 @@ PLANTED = (
     ),
     PlantedError(
         name="sign of the phase in the estimator",
-        file="estimator/range_profiles.py",
+        file="estimator/imaging/range_compression.py",
         right='table = scipy.fft.ifft(spectrum, axis=1, norm="forward"',
         wrong='table = scipy.fft.fft(spectrum, axis=1, norm="backward"',
         claims=("points", "pilot_range", "fig04_09_slam"),
@@ -59,7 +59,7 @@ PLANTED = (
     ),
     PlantedError(
         name="image plane 1 mm off in the estimator",
-        file="estimator/projection.py",
+        file="estimator/geometry/path_tracing_2d.py",
         right="((points - start) @ normal)[..., None] * normal",
         # Directions are mirrored about the origin: they are left alone.
         wrong="((points - start) @ normal + 1e-3 * bool(np.any(start)))[..., None] * normal",
@@ -67,14 +67,14 @@ PLANTED = (
     ),
     PlantedError(
         name="one-way for two-way range",
-        file="estimator/range_profiles.py",
+        file="estimator/imaging/range_compression.py",
         right="two_way = isinstance(data, Echo) and data.transmit_positions is None",
         wrong="two_way = False",
         claims=("points", "fig04_09_slam"),
     ),
     PlantedError(
         name="missing Jacobian of the Stolt step",
-        file="estimator/stolt.py",
+        file="estimator/imaging/stolt.py",
         right="weight = dr.select(inside, scale * sector * jacobian, 0.0)",
         wrong="weight = dr.select(inside, scale * sector, 0.0)",
         claims=("image_formers",),

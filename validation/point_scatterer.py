@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Echo, Uplink, Waves
+from estimator.measurement.model import Echo, Uplink, Waves
 
 
 def point_echo(

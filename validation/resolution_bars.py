@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from estimator.resolution import cell_at
+from estimator.array.resolution import cell_at
 from validation.figures import ON_DARK
 from validation.views import View
 

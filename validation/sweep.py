@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from estimator.estimate import Estimate, UserEstimate
+from estimator.results.estimate import Estimate, UserEstimate
 from scenes.files.loading import ScenarioSource
 from scenes.sampling.sample_space import SampleSpace, open_sample_space
 from scenes.sampling.variations import Variations, load_variations
@@ -217,7 +217,7 @@ def run_point(job: SweepJob, point: int) -> None:
     path = _outcome_file(job, scenario, point)
     seed, sample = job.config.seed, point // job.config.grid_size
     quiet = noise_free(scenario, seed=seed, sample=sample, folder=job.cache / "noise_free")
-    from estimator.localization import locate
+    from estimator.localization.locate import locate
 
     estimate = locate(with_receiver(quiet, scenario, seed=seed, sample=sample))
     truth = truth_from_dataset(scenario_truth(scenario))

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import linear_sum_assignment
 
-from estimator.estimate import Mirror, Target
+from estimator.results.estimate import Mirror, Target
 from validation.truth import Truth, front_face
 
 

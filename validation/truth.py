@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 
 Points = dict[str, Float[np.ndarray, " 3"]]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from estimator.estimate import Estimate, Image
+from estimator.results.estimate import Estimate, Image
 
 _ENERGY_KEPT = 0.98  # of an image's strong pixels inside its crop, along each axis
 

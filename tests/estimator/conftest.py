@@ -7,8 +7,8 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Echo
-from estimator.volume_survey import VolumeSurvey
+from estimator.imaging.survey_3d import VolumeSurvey
+from estimator.measurement.model import Echo
 
 BAND = np.linspace(220e9, 295e9, 251)  # 0.5 m of unambiguous echo range, 1 m of path
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
-from estimator.measurement import Echo, Measurement, Uplink
-from estimator.pixel_grid import PixelGrid
+from estimator.measurement.model import Echo, Measurement, Uplink
+from estimator.results.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
+from estimator.results.pixel_grid import PixelGrid
 from validation.truth import Truth
 
 

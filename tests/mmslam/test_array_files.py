@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.array_files import ArrayFiles
 
 VALUES = np.arange(6.0).reshape(2, 3)

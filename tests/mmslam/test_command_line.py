@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from estimator.storage import read_measurement
+from estimator.measurement.store import read_measurement
 from mmslam.cli import app
 from validation.truth import read_truth
 

@@ -8,8 +8,8 @@ import pytest
 import skrf  # type: ignore[import-untyped]
 from typer.testing import CliRunner
 
-from estimator.measurement import Echo, Measurement, Uplink
-from estimator.storage import read_measurement, write_measurement
+from estimator.measurement.model import Echo, Measurement, Uplink
+from estimator.measurement.store import read_measurement, write_measurement
 from mmslam.cli import app
 from mmslam.export_touchstone import export_touchstone
 from mmslam.import_measured import import_measured

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimator.localization import locate
-from estimator.measurement import MeasurementError
-from estimator.storage import read_measurement
+from estimator.localization.locate import locate
+from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import read_measurement
 from mmslam.cli import app
 from mmslam.export_touchstone import export_touchstone
 from mmslam.import_measured import Import, import_measured

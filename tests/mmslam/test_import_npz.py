@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.import_npz import import_npz
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from estimator.estimate import UserEstimate
-from estimator.measurement import Measurement, MeasurementError, Uplink
-from estimator.storage import measurement_to_dataset, write_measurement
+from estimator.measurement.model import Measurement, MeasurementError, Uplink
+from estimator.measurement.store import measurement_to_dataset, write_measurement
+from estimator.results.estimate import UserEstimate
 from mmslam.moving_users import track_answers, track_store
 from validation.point_scatterer import complex_noise, point_uplink
 

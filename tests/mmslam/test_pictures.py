@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.image import imread
 
-from estimator.estimate import Estimate
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate
 from mmslam import output
 from mmslam.pictures import write_pictures
 from validation.truth import Truth

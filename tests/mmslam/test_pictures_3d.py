@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from estimator.estimate import DirectionMap, Estimate, Image
-from estimator.measurement import Measurement
-from estimator.pixel_grid import PixelGrid
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import DirectionMap, Estimate, Image
+from estimator.results.pixel_grid import PixelGrid
 from mmslam.pictures import write_pictures
 from mmslam.result import result_document
 from validation import figures_3d

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimator.storage import read_measurement
+from estimator.measurement.store import read_measurement
 from mmslam.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]

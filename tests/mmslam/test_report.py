@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from estimator.estimate import Estimate
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate
 from mmslam.pictures import write_pictures
 from mmslam.report import radio_parameters, render_report
 from mmslam.result import result_document

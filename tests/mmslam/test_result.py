@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.estimate import Estimate
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate
 from mmslam.result import dimensions, result_document, to_json, versions
 from mmslam.summary import summary_lines
 from validation.truth import Truth

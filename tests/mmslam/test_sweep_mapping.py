@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 from typer.testing import CliRunner
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.cli import app
 from mmslam.sweep_mapping import SweepMapping, load_mapping, mapping_schema
 

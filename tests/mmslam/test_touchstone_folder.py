@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from mmslam.measured_signals import FolderReader
 from mmslam.sweep_mapping import PositionTable, SweepMapping
 from mmslam.touchstone_files import read_touchstone, touchstone_text

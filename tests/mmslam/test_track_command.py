@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner, Result
 
-from estimator.measurement import Measurement, Uplink
-from estimator.storage import measurement_to_dataset
+from estimator.measurement.model import Measurement, Uplink
+from estimator.measurement.store import measurement_to_dataset
 from mmslam.cli import app
 from validation.point_scatterer import complex_noise, point_uplink
 

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from scipy.constants import speed_of_light
 
-from estimator.measurement import MeasurementError
-from estimator.storage import read_measurement
+from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import read_measurement
 from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import ScenarioError
 from simulator import dataset, dataset_layout, dataset_store

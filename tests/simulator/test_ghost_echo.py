@@ -8,8 +8,8 @@ import pytest
 from jaxtyping import Bool, Float
 from scipy.constants import speed_of_light
 
-from estimator import engine
-from estimator.measurement import Waves
+from estimator.compute import engine
+from estimator.measurement.model import Waves
 from scenes.realisations.object_surface import Surface
 from simulator.facets import Facets, joined, profile_surface, surface_facets
 from simulator.few_frequencies import CHAIN_ACCURACY, nodes_for_chain

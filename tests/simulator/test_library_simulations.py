@@ -13,8 +13,8 @@ import mitsuba as mi
 import pytest
 import sionna.rt as rt
 
-from estimator import engine
-from estimator.storage import write_measurement
+from estimator.compute import engine
+from estimator.measurement.store import write_measurement
 from scenes.files.loading import load_scenario, scenario_names
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.scenario import MeshFile, Scenario
@@ -25,10 +25,10 @@ from simulator.simulation import simulate
 AS_IT_IS = """
 import sys
 import drjit as dr
-from estimator import engine
+from estimator.compute import engine
 engine.backend()
 dr.set_thread_count(int(sys.argv[1]))
-from estimator.storage import write_measurement
+from estimator.measurement.store import write_measurement
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 made = simulate(load_scenario(sys.argv[2], sys.argv[4:]), seed=7)

@@ -7,7 +7,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.special import hankel2
 
-from estimator import engine
+from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from simulator.facets import profile_surface
 from simulator.free_space import direct_wave

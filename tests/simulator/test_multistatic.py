@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator import engine
-from estimator.measurement import Echo
-from estimator.storage import read_measurement, write_measurement
+from estimator.compute import engine
+from estimator.measurement.model import Echo
+from estimator.measurement.store import read_measurement, write_measurement
 from scenes.scenario import Scenario, parse_scenario
 from simulator import multistatic
 from simulator.physical_optics import scattered

@@ -11,7 +11,7 @@ from scipy.constants import speed_of_light
 from scipy.spatial.transform import Rotation
 from scipy.special import hankel2
 
-from estimator.measurement import Waves
+from estimator.measurement.model import Waves
 from scenes.realisations.object_surface import Surface
 from scenes.surfaces.primitives import grid_triangles
 from scenes.surfaces.roughness_spectrum import rough_profile

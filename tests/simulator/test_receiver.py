@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Measurement
+from estimator.measurement.model import Measurement
 from scenes.files.loading import override_scenario
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.simulation import simulate

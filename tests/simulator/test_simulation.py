@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator import engine
-from estimator.measurement import Measurement
+from estimator.compute import engine
+from estimator.measurement.model import Measurement
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.radio_scene import radio_scene
 from simulator.simulation import simulate

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.measurement import Measurement, Uplink
-from estimator.storage import write_measurement
+from estimator.measurement.model import Measurement, Uplink
+from estimator.measurement.store import write_measurement
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.truth import scenario_truth

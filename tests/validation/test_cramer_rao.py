@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.measurement import Uplink
-from estimator.peaks import refine_paths
+from estimator.channel.relax import refine_paths
+from estimator.measurement.model import Uplink
 from validation.cramer_rao import (
     broadside_range_bound,
     cramer_rao_bound,

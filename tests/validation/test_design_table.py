@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from validation.design_table import design_table
 
 

@@ -5,8 +5,8 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from estimator.estimate import AngleRangeMap, Estimate, Image, UserEstimate
-from estimator.pixel_grid import PixelGrid
+from estimator.results.estimate import AngleRangeMap, Estimate, Image, UserEstimate
+from estimator.results.pixel_grid import PixelGrid
 from validation import figures, views
 
 

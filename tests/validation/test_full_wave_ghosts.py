@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from validation.full_wave_ghosts import compare_ghosts, main
 from validation.reference import ROUGH_WALL
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.measurement import MeasurementError
+from estimator.measurement.model import MeasurementError
 from validation.full_wave_reference import (
     BEAM_PARAMETER,
     Agreement,

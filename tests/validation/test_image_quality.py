@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from estimator.backprojection import backproject
-from estimator.estimate import Image
-from estimator.measurement import Echo
-from estimator.pixel_grid import PixelGrid
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Echo
+from estimator.results.estimate import Image
+from estimator.results.pixel_grid import PixelGrid
 from validation.image_quality import image_entropy, main_lobe, sidelobe_ratios
 from validation.point_scatterer import point_echo
 

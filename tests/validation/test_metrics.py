@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.estimate import Mirror
+from estimator.results.estimate import Mirror
 from validation.metrics import (
     error_summary,
     nearest_wall,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimator.resolution import HALF_POWER
+from estimator.array.resolution import HALF_POWER
 from validation.point_response import peak_cut
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.backprojection import backproject
+from estimator.imaging.backprojection import backproject
 from validation.point_scatterer import complex_noise, point_echo, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 201)

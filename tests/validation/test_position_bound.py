@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from jaxtyping import Complex, Float
 
-from estimator.measurement import Uplink
-from estimator.peaks import refine_paths
+from estimator.channel.relax import refine_paths
+from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.cramer_rao import cramer_rao_bound

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.measurement import Uplink
-from estimator.peaks import refine_paths
+from estimator.channel.relax import refine_paths
+from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.realisations.object_surface import object_surface, plate_segment
 from scenes.scenario import Scenario

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.estimate import Mirror, Target
+from estimator.results.estimate import Mirror, Target
 from validation.target_association import associate, compare_targets
 from validation.truth import Truth
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from estimator.measurement import Measurement, MeasurementError, Uplink
-from estimator.storage import write_measurement
+from estimator.measurement.model import Measurement, MeasurementError, Uplink
+from estimator.measurement.store import write_measurement
 from validation.truth import Truth, front_face, read_truth, truth_from_dataset
 
 AXIS = np.array(["x", "y", "z"], dtype=np.dtypes.StringDType())

@@ -5,7 +5,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.optimize import minimize_scalar
 
-from estimator.measurement import Uplink
+from estimator.measurement.model import Uplink
 
 FIRST_PATH_DB = -12.0
 """Level over the strongest path from which an earlier one counts as the first; Hann's window

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Complex, Float
 
-from estimator.measurement import Uplink
+from estimator.measurement.model import Uplink
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario
 from scenes.schema.base_station import BaseStation

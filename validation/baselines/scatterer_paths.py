@@ -17,8 +17,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Uplink
-from estimator.peaks import extract_paths
+from estimator.channel.relax import extract_paths
+from estimator.measurement.model import Uplink
 from validation.baselines.room import Fix, Room
 
 USER_ELEMENTS = 8

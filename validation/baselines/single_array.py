@@ -8,7 +8,7 @@ is before it.
 
 import numpy as np
 
-from estimator.peaks import extract_paths
+from estimator.channel.relax import extract_paths
 from validation.baselines.room import Fix, Room
 
 

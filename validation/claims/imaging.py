@@ -5,9 +5,9 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from estimator.backprojection import backproject, focus_uplink
-from estimator.pixel_grid import PixelGrid
-from estimator.range_migration import range_migration
+from estimator.imaging.backprojection import backproject, focus_uplink
+from estimator.imaging.range_migration import range_migration
+from estimator.results.pixel_grid import PixelGrid
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import simulator_on_points
 from validation.point_scatterer import point_echo, point_uplink

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.stats import beta, chi2, norm
 
-from estimator.estimate import Estimate
-from estimator.localization import locate
-from estimator.measurement import Measurement
+from estimator.localization.locate import locate
+from estimator.measurement.model import Measurement
+from estimator.results.estimate import Estimate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import position_errors

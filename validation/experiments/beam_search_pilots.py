@@ -11,7 +11,7 @@ there is no line of sight to speak of. Three searches:
 - *hierarchical*: from 4 elements on, ever longer parts of the array, the finer beams inside the
   best coarse one and its neighbours (after [1]_);
 - *predicted*: the beams within 2.6 deviations of the paths that
-  :func:`estimator.predicted_channel.predict_channel` gives for the map and the user's position.
+  :func:`estimator.prediction.channel_2d.predict_channel` gives for the map and the user's position.
 
 The array is 130 mm long, users are 0.3 to 2 m away: a beam has an angle and a curvature. The
 codebook is that of [2]_, uniform in the cosine of the angle and in sin²θ/R. A pilot is one tone at
@@ -48,9 +48,9 @@ from jaxtyping import Complex, Float, Int
 from matplotlib.axes import Axes
 from scipy.constants import speed_of_light
 
-from estimator.predicted_channel import predict_channel
-from estimator.projection import Wall, mirrored
-from estimator.room_map import build_room_map
+from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.mapping.map_2d import build_room_map
+from estimator.prediction.channel_2d import predict_channel
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.point_scatterer import complex_noise

@@ -27,11 +27,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from estimator.diffuse_search import SeenWall, search_diffuse
-from estimator.estimate import Estimate, UserEstimate
-from estimator.localization import locate
-from estimator.measurement import Uplink
-from estimator.projection import Wall
+from estimator.geometry.path_tracing_2d import Wall
+from estimator.localization.locate import locate
+from estimator.measurement.model import Uplink
+from estimator.positioning.diffuse_positioning import SeenWall, search_diffuse
+from estimator.results.estimate import Estimate, UserEstimate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 

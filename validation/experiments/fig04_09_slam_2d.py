@@ -28,9 +28,9 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from estimator.measurement import Uplink
-from estimator.resolution import angular_resolution
-from estimator.steering import angle_spectrum
+from estimator.array.resolution import angular_resolution
+from estimator.channel.steering import angle_spectrum
+from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from validation import figures, views
 from validation.claim import Row, Tell

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from estimator.steering import angle_spectrum
+from estimator.channel.steering import angle_spectrum
 from validation.point_scatterer import point_uplink
 
 FREQUENCY = 220e9

@@ -61,8 +61,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from estimator.backprojection import backproject
-from estimator.measurement import Echo
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Echo
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate

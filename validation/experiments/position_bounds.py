@@ -37,9 +37,9 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from estimator.localization import locate
-from estimator.measurement import Uplink
-from estimator.peaks import extract_paths
+from estimator.channel.relax import extract_paths
+from estimator.localization.locate import locate
+from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from simulator.radio_scene import facet_ports, radio_scene

@@ -28,9 +28,9 @@ from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 from scipy.special import hankel2
 
-from estimator.backprojection import backproject
-from estimator.measurement import Waves
-from estimator.resolution import HALF_POWER, cell_at, range_resolution
+from estimator.array.resolution import HALF_POWER, cell_at, range_resolution
+from estimator.imaging.backprojection import backproject
+from estimator.measurement.model import Waves
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.claim import Row

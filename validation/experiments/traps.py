@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from estimator.estimate import Estimate, Mirror
-from estimator.localization import locate
+from estimator.localization.locate import locate
+from estimator.results.estimate import Estimate, Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import position_errors

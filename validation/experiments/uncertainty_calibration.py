@@ -21,8 +21,8 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from estimator.estimate import Mirror
-from estimator.localization import locate
+from estimator.localization.locate import locate
+from estimator.results.estimate import Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.calibration import coverage, normalised_square

@@ -1,0 +1,133 @@
+r"""The curvature of an echo's wavefront tells what is seen from what is scattered twice.
+
+What the array sees, straight or over flat mirrors, comes from one point: the round trip to it
+is twice its distance from each antenna. A wave that a rough wall scatters on its way to a
+target, and that returns over the mirror itself, has the length
+
+.. math:: \lVert q - f \rVert + \lVert f - t \rVert + \lVert t - q \rVert
+
+over the antennas q, with the facet f and the target's image t. It appears half-way between their
+directions, with the curvature :math:`\tfrac12(1/\lVert f \rVert + 1/\lVert t \rVert)`: more
+than that of a point where it appears, as the facet is nearer. Scattered both ways, it has
+:math:`1/\lVert f \rVert`; so has every echo whose last scatterer lies before the end of its
+path. A bend that the aperture resolves tells the cloud of diffuse echoes around a ghost from
+the ghost, one speckle at a time. Less curvature than a point's is that of something smooth and
+flat or round, which is seen.
+"""
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.imaging.range_compression import RangeProfiles
+from estimator.walls.line_detection import Resolution
+
+BENDS = np.linspace(0.0, 24.0, 13)
+"""Excess phases at the ends of the aperture that are tried. [rad]."""
+SHIFTS = np.linspace(-0.75, 0.75, 7)
+"""Directions that are tried, about the peak's. [cells λ/2D]."""
+TILTS = np.linspace(-2.0, 2.0, 9)
+"""Directions of a reflection without curvature that are tried, about the peak's. [cells λ/2D]."""
+RANGE_SHIFTS = np.linspace(-0.5, 0.5, 3)
+"""Ranges that are tried, about the peak's. [cells c/2B]."""
+
+
+def bent_intensities(
+    profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], resolution: Resolution
+) -> Float[np.ndarray, "points bends"]:
+    """Focus points with ever more curved wavefronts, each at its best place within a cell.
+
+    Parameters
+    ----------
+    profiles
+        Of an echo in the array's frame, not tapered.
+    points
+        Where the image has its peaks. [m]
+    resolution
+        Of the echo.
+
+    Returns
+    -------
+    Largest intensity about each point for each of :data:`BENDS`. [-]
+    """
+    across = np.mean(profiles.legs, axis=0)[:, 0]
+    unit = (across - across.mean()) / (0.5 * np.ptp(across))
+    # A direction λ/2D aside turns the round trip by half a turn at either end.
+    phase = np.pi * SHIFTS[:, None] * unit + BENDS[:, None, None] * unit**2
+    tried = np.exp(1j * phase).reshape(-1, unit.size)
+    best = np.zeros((len(points), BENDS.size))
+    for shift in RANGE_SHIFTS:
+        aligned = _aligned(profiles, points, shift * resolution.along_ray)
+        # Not a matrix product: its bytes would depend on the number of threads.
+        focused = np.einsum("pm,km->pk", aligned, tried).reshape(-1, BENDS.size, SHIFTS.size)
+        best = np.maximum(best, (np.abs(focused) ** 2).max(axis=-1))
+    intensities: np.ndarray = best / profiles.gain**2
+    return intensities
+
+
+def coherence(
+    profiles: RangeProfiles,
+    points: Float[np.ndarray, "points 3"],
+    resolution: Resolution,
+    *,
+    flat: bool,
+    noise: float,
+) -> Float[np.ndarray, " points"]:
+    r"""Return which share of the energy at some places is one wave over the whole aperture.
+
+    .. math:: \frac{|\sum_m z_m|^2}{M \sum_m |z_m|^2}
+
+    of the M channels' profiles :math:`z_m` at the range to a place: one for a single point,
+    the share of the aperture for what only a part of it sees, 1/M for speckle and sidelobes
+    from elsewhere at the same range.
+
+    Parameters
+    ----------
+    profiles
+        Tapered over frequency, not over the positions.
+    points
+        Where the image has its peaks. [m]
+    resolution
+        Of the echo.
+    flat
+        Whether the wave is taken to come from a mirror that faces the array there, which
+        returns it without curvature.
+    noise
+        Variance that thermal noise adds to each :math:`z_m`, which is no wave.
+    """
+    across = np.mean(profiles.legs, axis=0)[:, 0]
+    offset = across - across.mean()
+    squared = np.einsum("px,px->p", points, points)
+    cosine2 = 1 - points[:, 0] ** 2 / squared
+    bend = -2 * np.pi * profiles.carrier / speed_of_light * cosine2 / np.sqrt(squared)
+    turn = np.exp(1j * bend[:, None] * offset**2) if flat else 1.0
+    # A reflection is as wide as the array, and has its peaks beside where it is perpendicular.
+    unit = offset / (0.5 * np.ptp(across))
+    tilts = np.exp(1j * np.pi * (TILTS if flat else np.zeros(1))[:, None] * unit)
+    best = np.zeros(len(points))
+    for shift in RANGE_SHIFTS:
+        aligned = _aligned(profiles, points, shift * resolution.along_ray)
+        energy = np.einsum("pm,pm->p", aligned, aligned.conj()).real
+        tilted = np.einsum("pm,tm->pt", aligned * turn, tilts)
+        wave = (np.abs(tilted) ** 2).max(axis=1) / offset.size
+        # Noise is taken out of the energy, but never more than all that is not the wave.
+        best = np.maximum(best, wave / np.maximum(energy - offset.size * noise, wave + 1e-300))
+    return best
+
+
+def _aligned(
+    profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], farther: float
+) -> Complex[np.ndarray, "points channels"]:
+    """Read each channel's profile at each point, the path's phase taken out."""
+    path = sum(np.linalg.norm(points[:, None] - leg, axis=-1) for leg in profiles.legs)
+    length = profiles.passes * path + 2 * farther
+    place = length / profiles.cell
+    whole = np.rint(place)
+    part = place - whole
+    channels, cells, _ = profiles.coefficients.shape
+    cubic = profiles.coefficients[np.arange(channels), whole.astype(np.int64) % cells]
+    value = cubic[..., 3]
+    for order in (2, 1, 0):
+        value = value * part + cubic[..., order]
+    aligned: np.ndarray = value * np.exp(2j * np.pi * profiles.carrier / speed_of_light * length)
+    return aligned

@@ -1,0 +1,62 @@
+"""Ghost correction: what the image shows behind mirrors is folded back to its true place."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from estimator.geometry.path_tracing_2d import Wall
+from estimator.geometry.specular_chains_2d import Chain, image_over, possible_chains, seen_over
+from estimator.walls.line_sampling import Focus
+
+
+@dataclass(frozen=True, kw_only=True)
+class Folded:
+    """Complex amplitudes at true places, and over which mirrors each was seen."""
+
+    values: Complex[np.ndarray, "*grid"]
+    chains: tuple[Chain, ...]
+    chain: Int[np.ndarray, "*grid"]  # index into chains; -1 where nothing is seen
+
+
+def corrected_image(
+    focus: Focus,
+    points: Float[np.ndarray, "*grid 3"],
+    walls: Sequence[Wall],
+    *,
+    raw: Complex[np.ndarray, "*grid"] | None = None,
+) -> Folded:
+    """Focus the echo on points where things really are.
+
+    The raw image shows a point at its image over each chain of mirrors over which the array (at
+    the origin) sees it. The brightest of these is kept, as the raw image has it: values are
+    focused there, neither interpolated nor added up.
+
+    Parameters
+    ----------
+    focus
+        Focuses the echo; it is given only points that are seen.
+    points
+        Points in the array's frame. [m]
+    walls
+        All mirrors, at their true place.
+    raw
+        What is focused on the points themselves, if that is known already. [-]
+    """
+    flat = points.reshape(-1, 3)
+    values = np.zeros(len(flat), dtype=np.complex128)
+    source = np.full(len(flat), -1, dtype=np.int64)
+    chains: list[Chain] = []
+    for chain in possible_chains(walls):
+        images = image_over(flat, walls, chain)
+        seen = np.flatnonzero(seen_over(images, walls, chain))
+        if not seen.size:
+            continue
+        shown = focus(images[seen]) if chain or raw is None else raw.ravel()[seen]
+        brighter = (source[seen] < 0) | (np.abs(shown) > np.abs(values[seen]))
+        values[seen[brighter]] = shown[brighter]
+        source[seen[brighter]] = len(chains)
+        chains.append(chain)
+    grid = points.shape[:-1]
+    return Folded(values=values.reshape(grid), chains=tuple(chains), chain=source.reshape(grid))

@@ -1,0 +1,105 @@
+"""The map of a room from its echo alone: mirrors at their true place, and targets."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.array.array_frame import ArrayFrame
+from estimator.geometry.path_tracing_2d import Wall
+from estimator.mapping.target_detection import find_targets
+from estimator.mapping.wall_unfolding import fold_seen_lines
+from estimator.measurement.model import Echo
+from estimator.results.estimate import Mirror, Target
+from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.line_refinement import refine_by_echo
+from estimator.walls.wall_detection_2d import (
+    Survey,
+    detect_mirrors,
+    echo_resolution,
+    loose_peaks,
+    survey,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoomMap:
+    """What the echo shows, in the array's frame; lines, walls and seen_through run alike."""
+
+    lines: tuple[FittedLine, ...]  # as the raw image shows them: ghosts where seen through others
+    walls: tuple[Wall, ...]  # the same at their true place
+    seen_through: tuple[tuple[int, ...], ...]  # indices of walls, from the array outward
+    joint_covariance: Float[np.ndarray, "parameters parameters"]
+    """Of all walls' (angle [rad], offset [m]), one wall after the other: walls that are folded
+    about the same mirror err together."""
+    targets: tuple[Target, ...]  # what is no mirror, at its true place
+    loose: Float[np.ndarray, "peaks 3"]  # peaks on no wall and behind none, strongest first [m]
+    survey: Survey
+
+
+def build_room_map(echo: Echo) -> RoomMap:
+    """Find mirrors and targets in an echo and put them where they really are.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame: its centre at the origin, its line along x, boresight along y.
+
+    Returns
+    -------
+    The map, in the same frame.
+    """
+    looked = survey(echo)
+    found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
+    resolution = echo_resolution(echo)
+    folded = fold_seen_lines(found, resolution)
+    aperture = float(np.ptp(echo.positions[:, 0]))
+    return RoomMap(
+        lines=folded.lines,
+        walls=folded.walls,
+        seen_through=folded.seen_through,
+        joint_covariance=folded.covariance,
+        targets=find_targets(looked, folded, found, resolution, aperture),
+        loose=loose_peaks(echo, looked, found),
+        survey=looked,
+    )
+
+
+def mirrors_in_world(room: RoomMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
+    """Return the mirrors of a map, as they are reported."""
+    return tuple(
+        _mirror(frame, line, wall, through)
+        for line, wall, through in zip(room.lines, room.walls, room.seen_through, strict=True)
+    )
+
+
+def targets_in_world(room: RoomMap, frame: ArrayFrame) -> tuple[Target, ...]:
+    """Return the targets of a map, as they are reported."""
+    return tuple(
+        replace(
+            target,
+            position=frame.to_world(target.position),
+            ghost=frame.to_world(target.ghost),
+            covariance=None
+            if target.covariance is None
+            else frame.axes.T @ target.covariance @ frame.axes,
+            ends=None if target.ends is None else frame.to_world(target.ends),
+        )
+        for target in room.targets
+    )
+
+
+def _mirror(frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int, ...]) -> Mirror:
+    normal = wall.normal
+    middle = 0.5 * (wall.start + wall.end)
+    if normal @ middle > 0:  # towards the array
+        normal = -normal
+    return Mirror(
+        start=frame.to_world(wall.start),
+        end=frame.to_world(wall.end),
+        normal=frame.turned_to_world(normal),
+        covariance=wall.covariance,
+        confidence=line.confidence,
+        level_db=float(10 * np.log10(line.level / line.background)),
+        seen_through=through,
+    )

@@ -1,0 +1,260 @@
+"""From the lines that an image shows to walls at their true place, with their joint covariance.
+
+A line that is seen over mirrors is mirrored back about each of them. Its place then depends on
+theirs: an error of a mirror's angle turns the folded wall twice, and the errors of both are
+correlated.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.geometry.path_tracing_2d import Wall, crossing, mirrored
+from estimator.geometry.specular_chains_2d import DEEPEST, Chain, unfolded
+from estimator.mapping.diffuse_multipath import between
+from estimator.walls.line_detection import Resolution
+from estimator.walls.line_fit_image import FittedLine
+
+SAMPLES = 9
+"""Places along a line at which it is asked what stands before them."""
+SAME_PLACE = 3.0
+"""Cells within which a folded line and a wall that is seen otherwise are one."""
+MIXED_SAMPLES = 65
+"""Places along a wall whose two views are mixed: closer than the cells of the mixture."""
+STEP = 1e-6
+"""Of the numerical derivatives. [rad], [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoldedWalls:
+    """Walls at their true place; those seen directly first, the strongest first."""
+
+    lines: tuple[FittedLine, ...]  # as the image shows them
+    walls: tuple[Wall, ...]
+    seen_through: tuple[Chain, ...]
+    covariance: Float[np.ndarray, "parameters parameters"]
+    """Of all walls' (angle [rad], offset [m]), one wall after the other."""
+    views: tuple[tuple[FittedLine, Wall], ...]
+    """Every line that is seen over mirrors, with its true place: also those that are left out,
+    as another view of a wall."""
+
+
+def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
+    """Fold each line over the mirrors that the array sees it through.
+
+    Parameters
+    ----------
+    lines
+        As the image shows them, the strongest first.
+    resolution
+        Of the image: which lines are two views of one wall.
+
+    Returns
+    -------
+    The walls; a line that is another view of a wall is left out.
+    """
+    kept: list[FittedLine] = []
+    walls: list[Wall] = []
+    seen: list[Chain] = []
+    views: list[tuple[FittedLine, Wall]] = []
+    for line in _from_the_array_outward(lines):
+        chain = _chain_before(line, walls)
+        folded = _folded(line, walls, chain)
+        if chain:
+            views.append((line, folded))
+        if len(chain) == DEEPEST or any(_is_one(line, folded, w, resolution) for w in walls):
+            continue
+        kept.append(line)
+        walls.append(folded)
+        seen.append(chain)
+    order = sorted(range(len(kept)), key=lambda i: (len(seen[i]), -kept[i].level))
+    place = {old: new for new, old in enumerate(order)}
+    lines = tuple(kept[i] for i in order)
+    chains = tuple(tuple(place[i] for i in seen[old]) for old in order)
+    nominal = [walls[i] for i in order]
+    joint = _joint_covariance(lines, nominal, chains)
+    return FoldedWalls(
+        lines=lines,
+        walls=tuple(
+            replace(wall, covariance=joint[2 * i : 2 * i + 2, 2 * i : 2 * i + 2])
+            for i, wall in enumerate(nominal)
+        ),
+        seen_through=chains,
+        covariance=joint,
+        views=tuple(views),
+    )
+
+
+def fold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
+    """Fold lines as :func:`fold_lines` does, without those that are two views of a wall mixed.
+
+    What goes out over a mirror and comes back directly shows a wall that is seen both ways a third
+    time, halfway between the two views, as sharply as they are.
+    """
+    folded = fold_lines(lines, resolution)
+    seen = [line for line in lines if not _is_mixed(line, folded, resolution)]
+    return folded if len(seen) == len(lines) else fold_lines(seen, resolution)
+
+
+def _is_mixed(line: FittedLine, folded: FoldedWalls, resolution: Resolution) -> bool:
+    """Tell whether most of a line is halfway between another's place and its wall's."""
+    points = np.linspace(line.start, line.end, SAMPLES)
+    for other, wall in folded.views:
+        if other is line:
+            continue
+        places = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
+        mixed = [
+            between(points, seen, true, resolution) for seen, true in zip(*places, strict=True)
+        ]
+        if np.mean(np.any(mixed, axis=0)) > 0.5:
+            return True
+    return False
+
+
+def _from_the_array_outward(lines: Sequence[FittedLine]) -> list[FittedLine]:
+    """Order lines so that each comes after those between it and the array."""
+    ordered: list[FittedLine] = []
+    pending = list(lines)
+    while pending:
+        hidden = [sum(_stands_before(b, a) for b in pending if b is not a) for a in pending]
+        # Lines that cross may hide each other: the one that is hidden least comes first.
+        first = min(
+            range(len(pending)),
+            key=lambda i: (hidden[i], float(np.linalg.norm(pending[i].middle))),
+        )
+        ordered.append(pending.pop(first))
+    return ordered
+
+
+def _stands_before(line: FittedLine, other: FittedLine) -> bool:
+    far = float(np.linalg.norm(other.middle))
+    hit = crossing(np.zeros(3), other.middle / far, line.start, line.end)
+    return hit is not None and hit[0] < far
+
+
+def _chain_before(line: FittedLine, walls: Sequence[Wall]) -> Chain:
+    """Return the mirrors over which most of a line is seen."""
+    shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    points = line.start + shares[:, None] * (line.end - line.start)
+    met = unfolded(points, walls)[1]
+    chains = Counter(tuple(int(i) for i in row if i >= 0) for row in met)
+    return chains.most_common(1)[0][0]
+
+
+def _folded(line: FittedLine, walls: Sequence[Wall], chain: Chain) -> Wall:
+    ends = np.stack([line.start, line.end])
+    for index in chain:
+        ends = mirrored(ends, walls[index].start, walls[index].end)
+    return Wall(start=ends[0], end=ends[1], covariance=line.covariance)
+
+
+def _is_one(line: FittedLine, folded: Wall, other: Wall, resolution: Resolution) -> bool:
+    """Tell whether most of a line, once folded, lies on another wall, within a few cells."""
+    along = (other.end - other.start) / np.linalg.norm(other.end - other.start)
+    points = np.linspace(folded.start, folded.end, SAMPLES)
+    # The cell is that of the image, where the line is farther away.
+    images = np.linspace(line.start, line.end, SAMPLES)
+    cells = resolution.cell(images, line.normal)
+    beside = np.abs((points - other.start) @ other.normal) < SAME_PLACE * cells
+    place = (points - other.start) @ along
+    inside = (place > 0) & (place < np.linalg.norm(other.end - other.start))
+    return bool(np.mean(beside & inside) > 0.5)
+
+
+def _joint_covariance(
+    lines: Sequence[FittedLine], walls: Sequence[Wall], chains: Sequence[Chain]
+) -> Float[np.ndarray, "parameters parameters"]:
+    """Propagate the lines' own covariances, which are independent, to the folded walls."""
+    size = 2 * len(lines)
+    own = np.zeros((size, size))
+    change = np.zeros((size, size))
+    for i, line in enumerate(lines):
+        own[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = line.covariance
+        for j in range(2):
+            moves = []
+            for sign in (STEP, -STEP):
+                shift = np.zeros((len(lines), 2))
+                shift[i, j] = sign
+                moves.append(_moves(_refolded(lines, chains, shift), walls))
+            change[:, 2 * i + j] = (moves[0] - moves[1]).ravel() / (2 * STEP)
+    joint: np.ndarray = change @ own @ change.T
+    return joint
+
+
+def _refolded(
+    lines: Sequence[FittedLine], chains: Sequence[Chain], shift: Float[np.ndarray, "lines 2"]
+) -> list[Wall]:
+    """Fold lines that are turned and moved a little; a chain's mirrors come before its wall."""
+    walls: list[Wall] = []
+    for line, chain, (tilt, offset) in zip(lines, chains, shift, strict=True):
+        seen = Wall(start=line.start, end=line.end, covariance=line.covariance)
+        moved = seen.moved(tilt=float(tilt), offset=float(offset))
+        walls.append(_folded(replace(line, start=moved.start, end=moved.end), walls, chain))
+    return walls
+
+
+def _moves(moved: Sequence[Wall], walls: Sequence[Wall]) -> Float[np.ndarray, "walls 2"]:
+    """Return by what each wall was turned, and moved along its normal at its midpoint."""
+    result = []
+    for new, old in zip(moved, walls, strict=True):
+        along = (old.end - old.start) / np.linalg.norm(old.end - old.start)
+        turned = (new.end - new.start) / np.linalg.norm(new.end - new.start)
+        tilt = along[0] * turned[1] - along[1] * turned[0]
+        result.append((tilt, float((new.start - 0.5 * (old.start + old.end)) @ new.normal)))
+    return np.array(result).reshape(-1, 2)
+
+
+def place_covariance(
+    ghost: Float[np.ndarray, " 3"],
+    covariance: Float[np.ndarray, "3 3"],
+    folded: FoldedWalls,
+    chain: Chain,
+) -> Float[np.ndarray, "3 3"]:
+    """Propagate the covariance of a place in the image, and of the mirrors, to its true place.
+
+    Parameters
+    ----------
+    ghost
+        Where the image shows it. [m]
+    covariance
+        Of that place. [m²]
+    folded
+        The walls.
+    chain
+        The mirrors over which it is seen.
+
+    Returns
+    -------
+    Covariance of the folded place. [m²]
+    """
+
+    def fold(walls: Sequence[Wall], point: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+        for index in chain:
+            point = mirrored(point, walls[index].start, walls[index].end)
+        return point
+
+    turn = np.stack(
+        [fold(folded.walls, ghost + axis) - fold(folded.walls, ghost) for axis in np.eye(3)],
+        axis=-1,
+    )
+    total = turn @ covariance @ turn.T
+    parameters = [2 * index + part for index in sorted(set(chain)) for part in (0, 1)]
+    columns = []
+    for parameter in parameters:
+        ends = []
+        for step in (STEP, -STEP):
+            walls = list(folded.walls)
+            shift = {"tilt": 0.0, "offset": 0.0}
+            shift["tilt" if parameter % 2 == 0 else "offset"] = step
+            walls[parameter // 2] = walls[parameter // 2].moved(**shift)
+            ends.append(fold(walls, ghost))
+        columns.append((ends[0] - ends[1]) / (2 * STEP))
+    if columns:
+        by_walls = np.stack(columns, axis=-1)
+        block = folded.covariance[np.ix_(parameters, parameters)]
+        total = total + by_walls @ block @ by_walls.T
+    result: np.ndarray = total
+    return result

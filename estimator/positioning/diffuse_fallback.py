@@ -1,0 +1,189 @@
+"""What diffuse scattering off the walls adds to the answer from a user's mirror-like paths."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.constants import speed_of_light
+from scipy.stats import chi2
+
+from estimator.geometry.path_tracing_2d import Wall, mirrored, project
+from estimator.measurement.model import Uplink
+from estimator.positioning.diffuse_positioning import DiffuseFix, SeenWall, search_diffuse
+from estimator.results.estimate import UserEstimate
+from estimator.walls.line_fit_image import FittedLine
+
+MOST_ENERGY = 0.5
+"""Share of the pilot's energy from which paths are not given up for what a wall scatters. [-]"""
+
+CELLS_APART = 3.0
+"""Cross-range cells λR/D from a strong path's place at which the diffuse field contradicts it:
+walls that are not quite where they were found move both, and each in its own way. [-]"""
+
+SAME = float(chi2.ppf(0.999, df=2))
+"""Squared distance, over its covariance, within which two positions are the same. [-]."""
+
+
+def with_diffuse_search(
+    answer: UserEstimate,
+    uplink: Uplink,
+    lines: Sequence[FittedLine],
+    walls: Sequence[Wall],
+    seen_through: Sequence[tuple[int, ...]],
+) -> UserEstimate:
+    """Search a user by diffuse scattering where its mirror-like paths do not settle the answer.
+
+    Parameters
+    ----------
+    answer
+        From the paths, in the array's frame.
+    uplink
+        The pilot, with positions in the array's frame and delays on its clock.
+    lines, walls, seen_through
+        The map: walls as the array sees them, where they are, and through which others.
+
+    Returns
+    -------
+    The answer itself, if no wall scatters from most of its length, or if it is ``found`` and the
+    diffuse field agrees. Else ``found`` where the diffuse field says, or at the one place over
+    mirror-like paths that agrees with it, whichever is known better; ``ambiguous`` if the diffuse
+    field, too, comes from several places alike, or contradicts paths with most of the energy.
+    """
+    if _settled(answer):
+        return answer
+    seen = [
+        SeenWall(seen=Wall(start=line.start, end=line.end, covariance=line.covariance),
+                 true=wall, through=through)
+        for line, wall, through in zip(lines, walls, seen_through, strict=True)
+    ]  # fmt: skip
+    fix = search_diffuse(uplink, seen)
+    if fix is None:
+        return answer
+    diffuse = _placed(answer, fix, seen)
+    if answer.status == "found" and (len(fix.rivals) or _confirms(diffuse, answer, walls)):
+        return answer
+    if answer.status == "found" and _share(answer) > MOST_ENERGY:
+        if not _far_apart(answer, diffuse, uplink):
+            return answer
+        return replace(
+            answer,
+            status="ambiguous",
+            reason="what the wall scatters comes from elsewhere than the path does",
+            alternatives=(replace(diffuse, status="ambiguous"),),
+        )
+    if len(fix.rivals):
+        if answer.status == "ambiguous":
+            return answer
+        return replace(
+            diffuse,
+            status="ambiguous",
+            reason="what the wall scatters is explained as well by other places",
+            alternatives=tuple(_moved(diffuse, rival) for rival in fix.rivals),
+        )
+    agreeing = [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
+    if len(agreeing) == 1 and _spread(agreeing[0]) < _spread(diffuse):
+        return replace(
+            agreeing[0], status="found", reason=None, alternatives=(), paths=answer.paths
+        )
+    return diffuse
+
+
+def _settled(answer: UserEstimate) -> bool:
+    """Tell whether several paths agree already: what a wall scatters is not needed then."""
+    return answer.status == "found" and sum(path.used for path in answer.paths) > 1
+
+
+def _share(answer: UserEstimate) -> float:
+    """Energy of the paths that an answer rests on, over the pilot's. [-]."""
+    return sum(path.share for path in answer.paths if path.used)
+
+
+def _far_apart(answer: UserEstimate, diffuse: UserEstimate, uplink: Uplink) -> bool:
+    """Tell whether two places are beyond what errors of walls make of one and the same."""
+    if answer.position is None or diffuse.position is None or answer.path_length is None:
+        return True
+    wavelength = speed_of_light / float(uplink.frequencies.mean())
+    cell = wavelength / float(np.ptp(uplink.positions[:, 0])) * answer.path_length
+    return float(np.linalg.norm(answer.position - diffuse.position)) > CELLS_APART * cell
+
+
+def _spread(one: UserEstimate) -> float:
+    """Largest standard deviation of a position. [m]."""
+    assert one.covariance is not None
+    return float(np.sqrt(np.linalg.eigvalsh(one.covariance)[-1]))
+
+
+def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) -> UserEstimate:
+    wall = walls[fix.wall]
+    middle = 0.5 * (wall.true.start + wall.true.end)
+    ghost = 0.5 * (wall.seen.start + wall.seen.end)
+    way = project(
+        float(np.arctan2(ghost[1], ghost[0])),
+        float(np.linalg.norm(ghost)),
+        [walls[index].true for index in wall.through],
+        covariance=np.zeros((2, 2)),
+    )
+    return UserEstimate(
+        name=answer.name,
+        status="found",
+        position=fix.position,
+        covariance=fix.covariance + _of_the_wall(fix.position, wall.true),
+        bounces=len(wall.through) + 1,
+        path=np.vstack([way.path[:-1], middle, fix.position]),  # over the middle of the wall
+        line_of_sight=False,
+        paths=tuple(
+            replace(path, used=False, reason="what the wall scatters comes from elsewhere")
+            if path.used
+            else path
+            for path in answer.paths
+        ),
+        method="diffuse",
+    )
+
+
+def _of_the_wall(position: Float[np.ndarray, " 3"], wall: Wall) -> Float[np.ndarray, "3 3"]:
+    """Covariance of a position that is known relative to a wall, from that of the wall."""
+    lever = position - 0.5 * (wall.start + wall.end)
+    turned = np.array([-lever[1], lever[0], 0.0])
+    jacobian = np.stack([turned, wall.normal], axis=-1)
+    covariance: np.ndarray = jacobian @ wall.covariance @ jacobian.T
+    return covariance
+
+
+def _confirms(diffuse: UserEstimate, answer: UserEstimate, walls: Sequence[Wall]) -> bool:
+    """Tell whether a diffuse field comes from an answer, or from its image in a later mirror.
+
+    The first wall of a path over several scatters what it receives from the user's image in the
+    next one.
+    """
+    later = {index for path in answer.paths if path.used for index in (path.mirrors or ())[1:]}
+    shown = [answer, *(_image_in(answer, walls[index]) for index in sorted(later))]
+    return any(_agree(one, diffuse) for one in shown)
+
+
+def _image_in(answer: UserEstimate, wall: Wall) -> UserEstimate:
+    """Return an answer at the place where a wall shows it. [m]."""
+    if answer.position is None or answer.covariance is None:
+        return answer
+    image = mirrored(answer.position, wall.start, wall.end)
+    turn = mirrored(np.eye(3), np.zeros(3), wall.end - wall.start)
+    # Moving a mirror moves the image twice as far.
+    covariance = turn @ answer.covariance @ turn.T + 4 * _of_the_wall(image, wall)
+    return replace(answer, position=image, covariance=covariance)
+
+
+def _moved(answer: UserEstimate, place: Float[np.ndarray, " 3"]) -> UserEstimate:
+    path = None if answer.path is None else np.vstack([answer.path[:-1], place])
+    return replace(answer, status="ambiguous", position=place, path=path)
+
+
+def _agree(one: UserEstimate, other: UserEstimate) -> bool:
+    """Tell whether two positions are the same within their covariances."""
+    if one.position is None or other.position is None:
+        return False
+    if one.covariance is None or other.covariance is None:
+        return False
+    apart = (one.position - other.position)[:2]
+    spread = (one.covariance + other.covariance)[:2, :2]
+    return bool(apart @ np.linalg.solve(spread, apart) < SAME)

@@ -1,0 +1,110 @@
+r"""Range profiles of point scatterers at a sweep's own range bins, and their slopes.
+
+A point at range r has, at the bins :math:`r_b = b c / 2 N \Delta f` of N frequencies about
+:math:`f_c`, the profile
+
+.. math:: \frac{1}{\sqrt N} \sum_n e^{-j 4 \pi (f_n - f_c) (r - r_b) / c}\, e^{-j 4 \pi f_c r / c}
+          = \frac{D(r_b - r)}{\sqrt N}\, e^{-j 4 \pi f_c r / c} ,
+          \qquad D = \frac{\sin(N x)}{\sin x}, \; x = 2 \pi \Delta f\, (r_b - r) / c .
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.compute import engine
+from estimator.compute.integer_division import row_and_column
+
+ON_BIN = 1e-7
+"""Least sin x that is divided by: nearer to a bin its kernel is N, and flat. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """Uniform frequencies."""
+
+    centre: float  # [Hz]
+    step: float  # [Hz]
+    count: int
+
+    @property
+    def bin_width(self) -> float:
+        """Distance of independent ranges, c/2NΔf. [m]."""
+        return speed_of_light / (2 * self.count * self.step)
+
+
+def point_profiles(
+    sweep: Sweep,
+    bins: Float[np.ndarray, " bins"],
+    ranges: Float[np.ndarray, "positions points"],
+    rates: Float[np.ndarray, "positions points"],
+) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
+    """Return the profile of each point, and how it changes as the points move.
+
+    Parameters
+    ----------
+    sweep
+        The frequencies.
+    bins
+        Ranges of the profiles: whole multiples of the sweep's bin width. [m]
+    ranges
+        From each antenna position to each point. [m]
+    rates
+        By how much these grow with what moves the points. [-]
+
+    Returns
+    -------
+    Profiles [-] and their derivatives [1/m], rows being positions and, within each, bins.
+    """
+    arrays = engine.arrays()
+    positions, points = ranges.shape
+    per_range = 2 * np.pi * sweep.step / speed_of_light
+    wavenumber = 4 * np.pi * sweep.centre / speed_of_light
+    # Bins are π/N apart in x: sin(Nx) of all bins is that of one, but for the sign.
+    turn = np.exp(1j * sweep.count * per_range * ranges)
+    carrier = np.exp(-1j * wavenumber * ranges) / np.sqrt(sweep.count)
+    sign = np.cos(sweep.count * per_range * bins)
+    of_point = [
+        arrays.Float64(np.ascontiguousarray(table, dtype=np.float64).ravel())
+        for table in (ranges, turn.real, turn.imag, carrier.real, carrier.imag, rates)
+    ]
+    of_bin = [arrays.Float64(bins), arrays.Float64(sign)]
+
+    lanes = positions * bins.size * points
+    lane = dr.arange(arrays.UInt32, lanes)
+    row, point = row_and_column(lane, points)
+    position, column = row_and_column(row, bins.size)
+    entry = position * dr.opaque(arrays.UInt32, points) + point
+    length, cosine_n, sine_n, carrier_re, carrier_im, rate = (
+        dr.gather(arrays.Float64, table, entry) for table in of_point
+    )
+    bin_range, turned = (dr.gather(arrays.Float64, table, column) for table in of_bin)
+
+    def opaque(value: float) -> Any:
+        return dr.opaque(arrays.Float64, value)
+
+    scale, count = opaque(per_range), opaque(float(sweep.count))
+    sine, cosine = dr.sincos((bin_range - length) * scale)
+    on_bin = abs(sine) < ON_BIN
+    inverse = 1 / dr.select(on_bin, 1.0, sine)
+    kernel = dr.select(on_bin, count, -turned * sine_n * inverse)
+    falling = (turned * cosine_n * count - kernel * cosine) * inverse * scale
+    real = dr.select(on_bin, 0.0, -falling) * rate
+    imag = -opaque(wavenumber) * kernel * rate
+    profiles, slopes = (dr.empty(arrays.Float64, 2 * lanes) for _ in range(2))
+    for table, re, im in (
+        (profiles, kernel * carrier_re, kernel * carrier_im),
+        (slopes, real * carrier_re - imag * carrier_im, real * carrier_im + imag * carrier_re),
+    ):
+        dr.scatter(table, re, 2 * lane)
+        dr.scatter(table, im, 2 * lane + 1)
+    dr.eval(profiles, slopes)
+    shape = positions * bins.size, points
+    return (
+        profiles.numpy().view(np.complex128).reshape(shape),
+        slopes.numpy().view(np.complex128).reshape(shape),
+    )

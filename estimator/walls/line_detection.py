@@ -1,0 +1,213 @@
+"""Straight lines among the peaks of a SAR image: a first guess of the mirrors.
+
+A rough wall shows as speckle: one peak for each resolution cell or two along it, of random
+strength. Every peak therefore counts the same here, however bright; a consensus over pairs
+of peaks then finds lines that a few bright facets, edges or point targets cannot feign.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import maximum_filter
+
+from estimator.array.resolution import HALF_POWER
+from estimator.array.windows import SURVEY_TAPER
+
+FALSE_ALARM = 1e-6
+"""Probability that a pixel of pure background counts as significant. [-]."""
+
+DYNAMIC_RANGE = 3e-5
+"""Intensity below the image's peak that may be a sidelobe of it (−45 dB). [-]."""
+
+MOST_PEAKS = 400
+"""Strongest peaks searched: the search is over all their pairs."""
+
+FEWEST_INLIERS = 5
+"""Peaks that make a line. Of n ≤ 400 peaks thrown at random over an area of hundreds of cells
+across, some line through two of them meets 6 more with a probability below 1e-3."""
+
+GAP = 7.0
+"""Cells without a peak that end a wall; speckle alone leaves so wide a gap with a
+probability below 1e-3 for each cell. [cells]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resolution:
+    """Resolution of an aperture at a point: fine along the ray, coarse across it."""
+
+    along_ray: float  # [m]
+    across_ray: float  # per metre of range: an angle [rad]
+
+    def cell(
+        self, points: Float[np.ndarray, "*n 3"], direction: Float[np.ndarray, " 3"]
+    ) -> Float[np.ndarray, "*n"]:
+        """Width of the resolution cell along a direction, for an array at the origin. [m]."""
+        reach = np.linalg.norm(points, axis=-1)
+        radial = np.abs(points @ direction) / reach
+        crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
+        width = 1 / np.hypot(radial / self.along_ray, crossing / (self.across_ray * reach))
+        return np.asarray(width)
+
+
+def coarse_resolution(fine: Resolution) -> Resolution:
+    """Return the resolution of the survey, which its taper widens."""
+    wider = SURVEY_TAPER.half_power_width / HALF_POWER
+    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineCandidate:
+    """A segment that many peaks lie on."""
+
+    start: Float[np.ndarray, " 3"]  # [m]
+    end: Float[np.ndarray, " 3"]  # [m]
+    inliers: int
+
+
+def significant_peaks(
+    intensity: Float[np.ndarray, "rows columns"], points: Float[np.ndarray, "rows columns 3"]
+) -> Float[np.ndarray, "peaks 3"]:
+    """Return the local maxima that stand out of the background, strongest first.
+
+    Parameters
+    ----------
+    intensity
+        Squared magnitude of an image that is sampled at about half its resolution.
+    points
+        Its pixels. [m]
+
+    Returns
+    -------
+    Where the peaks are [m]; the background is taken to be exponentially distributed, with
+    the image's median.
+    """
+    background = mean_background(intensity)
+    threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
+    rows, columns = np.nonzero(
+        (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
+    )
+    order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
+    return points[rows[order], columns[order]]
+
+
+def mean_background(intensity: Float[np.ndarray, "*n"]) -> float:
+    """Return the mean of an exponentially distributed background with this median."""
+    return float(np.median(intensity)) / float(np.log(2))
+
+
+def image_contrast(brightest: float, background: float) -> float:
+    """Return the intensity of an image's brightest point over its background; 0 of no image."""
+    if brightest == 0:
+        return 0.0
+    return brightest / background if background > 0 else np.inf
+
+
+def find_lines(
+    peaks: Float[np.ndarray, "peaks 3"], resolution: Resolution, *, most: int = MOST_PEAKS
+) -> tuple[LineCandidate, ...]:
+    """Find segments by consensus over all pairs of peaks; the one with most peaks first.
+
+    Parameters
+    ----------
+    peaks
+        Points at z = 0, in the frame of an array at the origin. [m]
+    resolution
+        Of the image that the peaks come from.
+    most
+        Where to stop.
+
+    Returns
+    -------
+    Segments, each with at least :data:`FEWEST_INLIERS` peaks; none uses another's peaks.
+    """
+    found: list[LineCandidate] = []
+    left = peaks
+    while len(left) >= FEWEST_INLIERS and len(found) < most:
+        candidate, members = _best_line(left, resolution)
+        if candidate is None:
+            break
+        found.append(candidate)
+        # The line's own peaks go, and the skirt of sidelobes beside it.
+        left = left[~(members | _on_segment(left, candidate, resolution, tolerance=2.0))]
+    return tuple(found)
+
+
+def _best_line(
+    peaks: Float[np.ndarray, "peaks 3"], resolution: Resolution
+) -> tuple[LineCandidate | None, Bool[np.ndarray, " peaks"]]:
+    first, second = np.triu_indices(len(peaks), k=1)
+    along = peaks[second] - peaks[first]
+    length = np.linalg.norm(along, axis=-1)
+    cells = resolution.along_ray + resolution.across_ray * np.linalg.norm(peaks[first], axis=-1)
+    apart = length > 3 * cells  # closer pairs point nowhere
+    first, along, length = first[apart], along[apart], length[apart]
+    best: tuple[int, np.ndarray] | None = None
+    for pairs in np.array_split(
+        np.arange(len(first)), max(1, len(first) * len(peaks) // 4_000_000)
+    ):
+        directions = along[pairs] / length[pairs, None]
+        near = _near_lines(peaks, peaks[first[pairs]], directions, resolution)
+        counts = near.sum(axis=1)
+        top = int(np.argmax(counts)) if len(counts) else 0
+        if len(counts) and (best is None or counts[top] > best[0]):
+            best = int(counts[top]), near[top]
+    nobody = np.zeros(len(peaks), dtype=bool)
+    if best is None or best[0] < FEWEST_INLIERS:
+        return None, nobody
+    return _longest_run(peaks, best[1], resolution)
+
+
+def _near_lines(
+    peaks: Float[np.ndarray, "peaks 3"],
+    origins: Float[np.ndarray, "lines 3"],
+    directions: Float[np.ndarray, "lines 3"],
+    resolution: Resolution,
+    tolerance: float = 0.5,
+) -> Bool[np.ndarray, "lines peaks"]:
+    normals = np.stack([directions[:, 1], -directions[:, 0]], axis=-1)
+    plane = peaks[:, :2]
+    distance = normals @ plane.T - np.einsum("lx,lx->l", normals, origins[:, :2])[:, None]
+    reach = np.linalg.norm(plane, axis=-1)
+    radial = np.abs(normals @ plane.T) / reach
+    crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
+    cell = 1 / np.hypot(radial / resolution.along_ray, crossing / (resolution.across_ray * reach))
+    near: np.ndarray = np.abs(distance) < tolerance * cell
+    return near
+
+
+def _longest_run(
+    peaks: Float[np.ndarray, "peaks 3"], members: Bool[np.ndarray, " peaks"], resolution: Resolution
+) -> tuple[LineCandidate | None, Bool[np.ndarray, " peaks"]]:
+    """Fit a line to the members by total least squares and keep their longest run."""
+    chosen = peaks[members]
+    centre = chosen.mean(axis=0)
+    direction = np.linalg.svd(chosen - centre)[2][0]
+    places = (chosen - centre) @ direction
+    order = np.argsort(places)
+    gaps = np.diff(places[order]) / resolution.cell(chosen[order[1:]], direction)
+    runs = np.split(order, np.nonzero(gaps > GAP)[0] + 1)
+    run = max(runs, key=len)
+    used = np.zeros(len(peaks), dtype=bool)
+    used[np.nonzero(members)[0][run]] = True
+    if len(run) < FEWEST_INLIERS:
+        return None, used
+    ends = centre + places[run[[0, -1]], None] * direction
+    return LineCandidate(start=ends[0], end=ends[1], inliers=len(run)), used
+
+
+def _on_segment(
+    peaks: Float[np.ndarray, "peaks 3"],
+    line: LineCandidate,
+    resolution: Resolution,
+    *,
+    tolerance: float,
+) -> Bool[np.ndarray, " peaks"]:
+    along = line.end - line.start
+    length = float(np.linalg.norm(along))
+    direction = along / length
+    places = (peaks - line.start) @ direction
+    margin = 3 * resolution.cell(peaks, direction)
+    beside = _near_lines(peaks, line.start[None], direction[None], resolution, tolerance)[0]
+    members: np.ndarray = beside & (places > -margin) & (places < length + margin)
+    return members

@@ -1,0 +1,82 @@
+"""How far a wall goes along its line: to the last bright cells, and there to the highest step."""
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.walls.line_detection import GAP, Resolution, mean_background
+from estimator.walls.line_sampling import SAMPLES_PER_CELL, Focus, cell_along, levels
+
+CELLS_AT_END = 12.0
+"""Cells either side of a wall's rough end that are searched for it."""
+CELLS_OF_STEP = 3.0
+"""Cells either side of an end whose mean levels differ most: speckle in so many leaves their mean
+a deviation of 3 dB, and walls end by tens of decibels."""
+END_LEVEL = 0.1
+"""Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
+of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
+
+
+def lit_extent(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+    reach: tuple[float, float],
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]] | None:
+    """Follow the line both ways until more than :data:`GAP` cells are dark."""
+    along = (end - start) / np.linalg.norm(end - start)
+    middle = 0.5 * (start + end)
+    step = cell_along(start, end, resolution) / SAMPLES_PER_CELL
+    count = int(np.ceil(np.linalg.norm(end - start) / step)) + 1
+    more = count  # as far again on either side
+    places = (np.arange(-more, count + more) - (count - 1) / 2) * step
+    points = middle + places[:, None] * along
+    distance = np.linalg.norm(points, axis=-1)
+    inside = (distance > reach[0]) & (distance < reach[1]) & (points[:, 1] > 0)
+    places, points = places[inside], points[inside]
+    intensity = np.abs(focus(points)) ** 2
+    within = np.abs(places) <= np.linalg.norm(end - start) / 2
+    level = mean_background(intensity[within])
+    background = levels(focus, start, end, resolution)[1]
+    # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
+    halfway = np.sqrt(level * background)
+    occupied = np.nonzero(intensity > halfway)[0]
+    if not within.any() or level < background or len(occupied) == 0:
+        return None
+    runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
+    run = max(runs, key=len)
+    if len(run) < 2 or len(run) < 0.3 * (run[-1] - run[0] + 1):
+        return None
+    level_db = 10 * np.log10(np.maximum(intensity, halfway))
+    outermost = len(places) - 1
+    first = end_of(level_db, int(run[0]))
+    last = outermost - end_of(level_db[::-1], outermost - int(run[-1]))
+    if last - first < 2:
+        return None
+    return middle + places[first] * along, middle + places[last] * along
+
+
+def end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:
+    """Return the first place that is wall, on a line that comes from outside.
+
+    The end is the highest step between the means, in decibels, of the cells before it and after.
+    What is scattered twice around a face that is seen over a mirror is a dim shoulder before its
+    end; a face may also be tens of decibels brighter in its middle than at its ends.
+
+    Parameters
+    ----------
+    level_db
+        Intensity from outside to inside; not below what counts as dark. [dB]
+    rough
+        About where the wall begins.
+    """
+    near, wide = round(CELLS_AT_END * SAMPLES_PER_CELL), round(CELLS_OF_STEP * SAMPLES_PER_CELL)
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(level_db, wide, mode="edge"))])
+    means = (sums[wide:] - sums[:-wide]) / wide
+    steps = means[wide:-1] - means[: -wide - 1]  # after place i, less before it
+    start = max(0, rough - near)
+    step = start + int(np.argmax(steps[start : rough + near]))
+    # A minimum of the speckle may be a higher step than the wall's end, a few cells further out.
+    enough = np.median(level_db[step : step + near]) + 10 * np.log10(END_LEVEL / np.log(2))
+    outer = max(0, step - 2 * wide)
+    return outer + int(np.argmax(np.append(level_db[outer:step] > enough, True)))

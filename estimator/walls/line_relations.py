@@ -1,0 +1,106 @@
+"""How lines of an image lie to points and to each other, seen from the array."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.geometry.path_tracing_2d import crossing, mirrored
+from estimator.walls.line_detection import Resolution
+from estimator.walls.line_fit_image import FittedLine
+
+EDGE_DEVIATIONS = 3.0
+"""Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
+
+
+def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
+    """Tell whether a line stands between the array and a point."""
+    far = float(np.linalg.norm(point))
+    hit = crossing(np.zeros(3), point / far, line.start, line.end)
+    return hit is not None and hit[0] < far
+
+
+def lies_on(
+    point: Float[np.ndarray, " 3"],
+    line: FittedLine,
+    resolution: Resolution,
+    *,
+    margin: float = 0.0,
+) -> bool:
+    """Tell whether a point is on a segment, within two cells across and a margin along it."""
+    normal = line.normal
+    beside = abs(float((point - line.middle) @ normal))
+    along = abs(float((point - line.middle) @ line.direction))
+    reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
+    return beside < 2 * float(resolution.cell(point, normal)) and along < reach
+
+
+def _share_on(
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    line: FittedLine,
+    resolution: Resolution,
+) -> float:
+    """Return the share of a segment that lies on a line. [-]."""
+    return float(
+        np.mean([lies_on(point, line, resolution) for point in np.linspace(start, end, 9)])
+    )
+
+
+def overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
+    """Tell whether a good part of a line lies on another."""
+    return _share_on(line.start, line.end, other, coarse) > 1 / 3
+
+
+def is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
+    """Tell whether a good part of a line is behind others."""
+    points = np.linspace(line.start, line.end, 9)
+    before = [other for other in others if other is not line]
+    return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
+
+
+def seen_twice(
+    doubtful: Sequence[FittedLine], known: Sequence[FittedLine], resolution: Resolution
+) -> list[FittedLine]:
+    """Return the doubtful lines that are seen directly and, mirrored, over a known wall.
+
+    Neither clouds nor ambiguities have an image just where a wall would show it.
+
+    Parameters
+    ----------
+    doubtful
+        Lines of the image.
+    known
+        Walls; what is behind one may be an image.
+    resolution
+        Of the image.
+    """
+    either = [*known, *doubtful]
+    twice: set[int] = set()
+    for i, image in enumerate(either):
+        for mirror in known:
+            if image is mirror or not hides(mirror, image.middle):
+                continue
+            ends = mirrored(np.stack([image.start, image.end]), mirror.start, mirror.end)
+            for j, wall in enumerate(either):
+                if wall is image or wall is mirror or hides(mirror, wall.middle):
+                    continue
+                if _share_on(ends[0], ends[1], wall, resolution) > 0.5:
+                    twice |= {i, j}
+    return [either[i] for i in sorted(twice) if i >= len(known)]
+
+
+def is_edge_on(line: FittedLine, half: float) -> bool:
+    """Tell whether a line points at the array, which so sees both faces: it mirrors to neither.
+
+    Parameters
+    ----------
+    line
+        In the array's frame.
+    half
+        Half the length of the array. [m]
+    """
+    normal = line.normal
+    deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
+    reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
+    return abs(float(line.middle @ normal)) < reach

@@ -1,0 +1,352 @@
+r"""Maximum-likelihood fit of spherical waves to an uplink, together, below the grid, in float64.
+
+The model of each wave is (3-10) of the thesis with the delay and the curvature of the wavefront
+as separate lengths,
+
+.. math:: u_{mn} = \alpha \frac{R_c}{r_m} e^{-j k_n (r_m - R_c + R)}, \qquad
+          r_m = \lVert R_c\,\hat s(\theta) - q_m \rVert .
+
+A direct path, or one over flat mirrors, has :math:`R_c = R`: the image of the user radiates
+as the user does. A wave that a point (an edge, a rough patch) scatters keeps the path's
+delay, but its curvature is that of the last leg alone. Comparing both tells them apart.
+
+All waves of a pilot are fitted at once (RELAX in the limit), so that the sidelobes of one do not
+pull another. The covariance holds what noise does, and what bends the wavefront beside it
+(:mod:`estimator.wavefronts.phase_error`): with N = JᵀJ and the error's own JᵀCJ it is N⁻¹ JᵀCJ N⁻¹.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.measurement.model import UNIFORM_STEP, Uplink
+from estimator.wavefronts.phase_error import noise_variance, wavefront_error
+
+ITERATIONS = 40
+CONVERGED = 1e-2
+"""Step at which the iteration ends, in standard deviations of the parameters. [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaveStart:
+    """Where the fit of a wave begins, within its main lobe."""
+
+    aoa: float  # [rad]
+    path_length: float  # [m]
+    radius: float | None = None  # of curvature; None: it is the path length, also in the fit [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphericalWave:
+    """One wave in the array's frame and how well it is known."""
+
+    aoa: float  # from the array's axis [rad]
+    path_length: float  # from its delay [m]
+    radius: float  # of curvature [m]
+    gain: complex  # field at the array's centre, at zero path length [-]
+    covariance: Float[np.ndarray, "parameters parameters"]  # of aoa, path length (, radius)
+    explained: float  # its energy over the uplink's; of orthogonal waves, their shares [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedWaves:
+    """Waves that were fitted together."""
+
+    waves: tuple[SphericalWave, ...]  # in the order of their starts
+    covariance: Float[np.ndarray, "all all"]  # of all parameters, wave after wave
+    white: Float[np.ndarray, "all all"]  # the same for a unit variance of white noise alone
+    left: Complex[np.ndarray, "elements freqs"]  # the pilot less all waves [-]
+
+
+def wave_field(
+    positions: Float[np.ndarray, "elements 3"],
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    aoa: float,
+    path_length: float,
+    radius: float,
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Evaluate the model's field at unit gain, for elements in the array's frame. [-]."""
+    source = radius * np.array([np.cos(aoa), np.sin(aoa), 0.0])
+    distances = np.linalg.norm(source - positions, axis=-1)
+    # r − R_c without cancellation: a plane wave has a radius beyond all measure.
+    excess = ((positions**2).sum(axis=-1) - 2 * positions @ source) / (distances + radius)
+    field: np.ndarray = (radius / distances)[:, None] * _delayed(excess + path_length, frequencies)
+    return field
+
+
+def _delayed(
+    lengths: Float[np.ndarray, " elements"], frequencies: Float[np.ndarray, " freqs"]
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Evaluate exp(-jkL) for every length and frequency."""
+    per_metre = frequencies / speed_of_light
+    steps = np.diff(frequencies)
+    block = int(np.ceil(np.sqrt(frequencies.size)))
+    if frequencies.size < 4 or np.ptp(steps) > UNIFORM_STEP * steps[0]:
+        return _phasor(np.outer(lengths, per_metre))
+    # On a uniform grid the phase of frequency a·block + b is a product of two phasors.
+    step = float(per_metre[-1] - per_metre[0]) / (frequencies.size - 1)
+    coarse = _phasor(np.outer(lengths, per_metre[::block]))
+    fine = _phasor(np.outer(lengths, step * np.arange(block)))
+    field = coarse[:, :, None] * fine[:, None, :]
+    return np.ascontiguousarray(field.reshape(len(lengths), -1)[:, : frequencies.size])
+
+
+def _phasor(turns: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
+    phasor: np.ndarray = np.exp(-2j * np.pi * (turns - np.round(turns)))
+    return phasor
+
+
+def fit_spherical_wave(
+    uplink: Uplink, *, aoa: float, path_length: float, radius: float | None = None
+) -> SphericalWave:
+    """Refine one peak of the angle/range map: :func:`fit_spherical_waves` for a single wave."""
+    start = WaveStart(aoa=aoa, path_length=path_length, radius=radius)
+    return fit_spherical_waves(uplink, [start]).waves[0]
+
+
+def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWaves:
+    """Refine peaks of the angle/range map together, for elements in the array's frame.
+
+    Parameters
+    ----------
+    uplink
+        The pilot, with positions in the array's frame.
+    starts
+        The peaks on the grid, each within its main lobe.
+
+    Returns
+    -------
+    The waves. What the model leaves over beside noise is taken to bend each wave on its own.
+
+    Raises
+    ------
+    ValueError
+        If the iteration leaves the neighbourhood of a peak, or two waves become one.
+    """
+    wavenumbers = 2 * np.pi * uplink.frequencies / speed_of_light
+    parameters = [
+        np.array([start.aoa, start.path_length] + ([start.radius] if start.radius else []))
+        for start in starts
+    ]
+    first = [values.copy() for values in parameters]
+    lobe = _main_lobe(uplink, wavenumbers)
+    state = _linearised(uplink, wavenumbers, parameters)
+    for _ in range(ITERATIONS):
+        bread = _inverse(state.normal, starts)
+        steps = np.split(bread @ state.scores.sum(axis=0), state.bounds)
+        limit = max(
+            _overshoot(step, values, lobe) for step, values in zip(steps, parameters, strict=True)
+        )
+        # Far from the peak the linear model overshoots: never move by more than half a lobe.
+        moves = [step[2:] / max(1.0, limit) for step in steps]
+        parameters = [values + move for values, move in zip(parameters, moves, strict=True)]
+        for values, origin, start in zip(parameters, first, starts, strict=True):
+            if np.any(np.abs(values[:2] - origin[:2]) > 2 * lobe) or np.any(values <= 0):
+                raise ValueError(
+                    f"no peak within two main lobes of {np.degrees(start.aoa):.3f}°, "
+                    f"{start.path_length:.4f} m"
+                )
+        noise = np.sqrt(np.mean(np.abs(state.left) ** 2) / 2)
+        floor = 1e-7 * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
+        deviations = np.split(np.sqrt(np.diag(bread)), state.bounds)
+        done = all(
+            np.all(np.abs(move) < CONVERGED * deviation[2:] * max(noise, floor))
+            for move, deviation in zip(moves, deviations, strict=True)
+        )
+        state = _linearised(uplink, wavenumbers, parameters)
+        if done:
+            break
+    return _described(uplink, wavenumbers, parameters, starts, state)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Linear:
+    """The model about some parameters."""
+
+    gains: Complex[np.ndarray, " waves"]
+    fields: tuple[Complex[np.ndarray, "elements freqs"], ...]  # of each wave, with its gain
+    slopes: tuple[Float[np.ndarray, "elements _"], ...]  # of its length by its parameters
+    normal: Float[np.ndarray, "all all"]  # JᵀJ
+    scores: Float[np.ndarray, "elements all"]  # each element's Jᵀe
+    left: Complex[np.ndarray, "elements freqs"]
+    bounds: list[int]  # where the columns of one wave end
+
+
+def _main_lobe(uplink: Uplink, wavenumbers: Float[np.ndarray, " freqs"]) -> Float[np.ndarray, " 2"]:
+    aperture = float(np.ptp(uplink.positions[:, 0]))
+    return np.array(
+        [
+            2 * np.pi / (wavenumbers[-1] * aperture),
+            2 * np.pi / max(np.ptp(wavenumbers), wavenumbers[-1] * 1e-3),
+        ]
+    )
+
+
+def _overshoot(
+    step: Float[np.ndarray, " columns"],
+    values: Float[np.ndarray, " parameters"],
+    lobe: Float[np.ndarray, " 2"],
+) -> float:
+    """Return by how much a step is too long."""
+    limit = float(np.max(np.abs(step[2:4]) / (0.5 * lobe), initial=0.0))
+    return max(limit, abs(step[4]) / (0.3 * values[2])) if len(values) == 3 else limit
+
+
+def _linearised(
+    uplink: Uplink,
+    wavenumbers: Float[np.ndarray, " freqs"],
+    parameters: Sequence[Float[np.ndarray, " _"]],
+) -> _Linear:
+    """Linearise about parameters, with the gains that fit best.
+
+    Columns of J, wave by wave: real and imaginary part of the relative gain, then the
+    parameters. The amplitude ratio's own dependence on them carries 1/(kr)² of their
+    information: left out.
+    """
+    units = [
+        wave_field(
+            uplink.positions,
+            uplink.frequencies,
+            aoa=float(values[0]),
+            path_length=float(values[1]),
+            radius=float(values[-1]),
+        )
+        for values in parameters
+    ]
+    gram = np.array([[np.vdot(one, other) for other in units] for one in units])
+    against = np.array([np.vdot(unit, uplink.samples) for unit in units])
+    try:
+        gains = np.linalg.solve(gram, against)
+    except np.linalg.LinAlgError:
+        raise ValueError("two waves became one") from None
+    fields = tuple(gain * unit for gain, unit in zip(gains, units, strict=True))
+    left = uplink.samples - sum(fields)
+    slopes = tuple(_slopes(uplink, values) for values in parameters)
+    # With J = wave·(1, j, −jk·slope), JᵀJ and Jᵀe separate into sums over frequency.
+    powers = wavenumbers[:, None] ** np.arange(3)
+    columns = [_columns(one) for one in slopes]
+    scores = []
+    for field, (shape, order) in zip(fields, columns, strict=True):
+        matched = (np.conj(field) * left) @ powers[:, :2]
+        scores.append((np.conj(shape) * matched[:, order]).real)
+    ends = np.cumsum([shape.shape[1] for shape, _ in columns])
+    sums = powers.sum(axis=0)
+
+    def alone(field: Complex[np.ndarray, "elements freqs"]) -> Float[np.ndarray, "elements 3"]:
+        """Sum |field|² kⁿ over frequency: the model's amplitude is the same at all of them."""
+        size: np.ndarray = np.abs(field[:, 0]) ** 2
+        return np.outer(size, sums)
+
+    normal = np.zeros((ends[-1], ends[-1]))
+    for i, (first, (shape, order)) in enumerate(zip(fields, columns, strict=True)):
+        for j, (second, (other, higher)) in enumerate(zip(fields, columns, strict=True)):
+            if j < i:
+                continue
+            product = (np.conj(first) * second) @ powers if i != j else alone(first)
+            block = np.einsum(
+                "mi,mj,mij->ij", np.conj(shape), other, product[:, np.add.outer(order, higher)]
+            ).real
+            rows = slice(ends[i] - len(order), ends[i])
+            across = slice(ends[j] - len(higher), ends[j])
+            normal[rows, across] = block
+            normal[across, rows] = block.T
+    return _Linear(
+        gains=gains,
+        fields=fields,
+        slopes=slopes,
+        normal=normal,
+        scores=np.concatenate(scores, axis=1),
+        left=left,
+        bounds=[int(end) for end in ends[:-1]],
+    )
+
+
+def _slopes(
+    uplink: Uplink, values: Float[np.ndarray, " parameters"]
+) -> Float[np.ndarray, "elements parameters"]:
+    """Differentiate the length r − R_c + R by (aoa, R[, R_c]), for each element."""
+    aoa, radius = float(values[0]), float(values[-1])
+    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
+    turned = np.array([-np.sin(aoa), np.cos(aoa), 0.0])
+    reach = radius * towards - uplink.positions
+    reach = reach / np.linalg.norm(reach, axis=-1, keepdims=True)
+    bend = reach @ towards
+    free = len(values) == 3
+    lengths = [radius * (reach @ turned), np.ones_like(bend) if free else bend]
+    if free:
+        lengths.append(bend - 1)
+    return np.stack(lengths, axis=-1)
+
+
+def _columns(
+    slopes: Float[np.ndarray, "elements parameters"],
+) -> tuple[Complex[np.ndarray, "elements columns"], np.ndarray]:
+    """Return the factors of a wave's columns of J, and the power of k that each one has."""
+    ones = np.ones(len(slopes))
+    shape = np.column_stack([ones, 1j * ones, -1j * slopes])
+    return shape, np.array([0, 0] + [1] * slopes.shape[1])
+
+
+def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) -> np.ndarray:
+    """Invert JᵀJ, with its columns scaled to equal length."""
+    scale = 1 / np.sqrt(np.diag(normal))
+    scaled = normal * np.outer(scale, scale)
+    if len(starts) > 1 and np.linalg.cond(scaled) > 1e12:
+        raise ValueError("two waves became one")
+    inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
+    return inverse
+
+
+def _described(
+    uplink: Uplink,
+    wavenumbers: Float[np.ndarray, " freqs"],
+    parameters: Sequence[Float[np.ndarray, " _"]],
+    starts: Sequence[WaveStart],
+    state: _Linear,
+) -> FittedWaves:
+    bread = _inverse(state.normal, starts)
+    noise = noise_variance(state.left)
+    meat = 0.5 * noise * state.normal
+    ends = [*state.bounds, len(bread)]
+    count = wavenumbers.size
+    falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    for field, slopes, end in zip(state.fields, state.slopes, ends, strict=True):
+        error = wavefront_error(state.left, field, noise)
+        # What an error of the phase alone does to Jᵀe: it has the columns' part along j·wave.
+        power = np.abs(field) * np.sqrt(np.mean(np.abs(field) ** 2))
+        for variance, shape in ((error.mean, np.ones(count)), (error.slope, falling)):
+            plain = power @ shape
+            weighted = power @ (wavenumbers * shape)
+            columns = np.column_stack([0 * plain, plain, -weighted[:, None] * slopes])
+            rows = slice(end - columns.shape[1], end)
+            meat[rows, rows] += variance * columns.T @ columns
+    keep = np.concatenate(
+        [np.arange(end - len(values), end) for values, end in zip(parameters, ends, strict=True)]
+    )
+    covariance = (bread @ meat @ bread)[np.ix_(keep, keep)]
+    covariance = 0.5 * (covariance + covariance.T)
+    energy = float(np.vdot(uplink.samples, uplink.samples).real)
+    waves = []
+    last = 0
+    for values, gain, field in zip(parameters, state.gains, state.fields, strict=True):
+        own = slice(last, last := last + len(values))
+        waves.append(
+            SphericalWave(
+                aoa=float(values[0]),
+                path_length=float(values[1]),
+                radius=float(values[-1]),
+                gain=complex(gain),
+                covariance=covariance[own, own],
+                explained=float(np.vdot(field, field).real) / energy,
+            )
+        )
+    return FittedWaves(
+        waves=tuple(waves),
+        covariance=covariance,
+        white=0.5 * bread[np.ix_(keep, keep)],
+        left=state.left,
+    )

@@ -1,0 +1,64 @@
+"""Where diffuse echoes over a rough mirror appear, against their own lengths."""
+
+import numpy as np
+import pytest
+
+from estimator.geometry.path_tracing_2d import mirrored
+from estimator.mapping.diffuse_multipath import between, in_cloud
+from estimator.walls.line_detection import Resolution
+from estimator.walls.line_fit_image import FittedLine
+
+RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
+WALL = FittedLine(
+    start=np.array([-0.14, 0.66, 0.0]),
+    end=np.array([0.14, 0.94, 0.0]),
+    covariance=np.zeros((2, 2)),
+    level=1.0,
+    background=1e-3,
+    confidence=1.0,
+)
+TARGET = np.array([0.4, 0.74, 0.0])
+GHOST = mirrored(TARGET, WALL.start, WALL.end)
+
+
+def appears(*ways: np.ndarray) -> np.ndarray:
+    """Where an echo appears that goes out over one point of the wall and back over another."""
+    lengths = [np.linalg.norm(facet) + np.linalg.norm(facet - TARGET) for facet in ways]
+    sine = np.mean([facet[0] / np.linalg.norm(facet) for facet in ways])
+    return np.asarray(np.mean(lengths) * np.array([sine, np.sqrt(1 - sine**2), 0.0]))
+
+
+def on_wall(share: float) -> np.ndarray:
+    return np.asarray(WALL.start + share * (WALL.end - WALL.start))
+
+
+@pytest.mark.parametrize("back", [0.1, 0.35, 0.9])
+@pytest.mark.parametrize("out", [0.03, 0.5, 0.77])
+def test_diffuse_echoes_are_in_the_cloud_of_their_ghost(out: float, back: float) -> None:
+    place = appears(on_wall(out), on_wall(back))
+    assert in_cloud(place[None], GHOST, [WALL], RESOLUTION)[0]
+    assert np.linalg.norm(place) >= np.linalg.norm(GHOST) - 1e-12  # never nearer
+
+
+def test_the_specular_way_back_keeps_a_cloud_at_the_ghosts_range() -> None:
+    # Where the straight line to the ghost meets the wall y = x + 0.8.
+    specular = GHOST * 0.8 / (GHOST[1] - GHOST[0])
+    np.testing.assert_allclose(appears(specular, specular), GHOST, atol=1e-12)
+    assert in_cloud(appears(specular, on_wall(0.9))[None], GHOST, [WALL], RESOLUTION)[0]
+
+
+def test_what_is_nearer_or_farther_or_aside_is_no_cloud() -> None:
+    ray = GHOST / np.linalg.norm(GHOST)
+    aside = np.linalg.norm(GHOST) * np.array([0.3, np.sqrt(1 - 0.09), 0.0])
+    points = np.stack([GHOST - 0.01 * ray, GHOST + 0.2 * ray, aside])
+    assert not in_cloud(points, GHOST, [WALL], RESOLUTION).any()
+    assert not in_cloud(points, GHOST, [], RESOLUTION).any()
+
+
+def test_one_way_out_and_another_back_appear_between_the_two() -> None:
+    direct = np.array([0.2, 0.6, 0.0])
+    sine = np.mean([p[0] / np.linalg.norm(p) for p in (direct, GHOST)])
+    reach = np.mean([np.linalg.norm(p) for p in (direct, GHOST)])
+    mixed = reach * np.array([sine, np.sqrt(1 - sine**2), 0.0])
+    points = np.stack([mixed, direct, GHOST, mixed * 1.02])
+    assert between(points, direct, GHOST, RESOLUTION).tolist() == [True, False, False, False]
