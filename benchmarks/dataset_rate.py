@@ -22,8 +22,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from simulator.dataset import make_dataset, plan_dataset
-from simulator.resumable_work import Workers
+from simulator.dataset.builder import make_dataset, plan_dataset
+from simulator.dataset.task_runner import Workers
 
 psutil: Any = importlib.import_module("psutil")  # comes with Dask's scheduler, without types
 

@@ -24,12 +24,12 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from scenes.scenario import parse_scenario
-from simulator.facets import Facets
-from simulator.links_in_space import scattered_in_space
-from simulator.physical_optics import Ports, facet_transform, isotropic, scattered
-from simulator.radio_scene import RadioScene, radio_scene
-from simulator.ray_scene import CLEARANCE, facets_visible
-from simulator.sights import array_sight
+from simulator.geometry.facets import Facets
+from simulator.geometry.ray_scene import CLEARANCE, facets_visible
+from simulator.response.single_bounce_3d import scattered_in_space
+from simulator.scattering.physical_optics import Ports, facet_transform, isotropic, scattered
+from simulator.scene.array_antennas import array_sight
+from simulator.scene.radio_scene import RadioScene, radio_scene
 
 POSITIONS = 260
 DIRECT_FACETS, DIRECT_FREQUENCIES = 20_000, 101

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from scenes.files.loading import load_scenario
-from simulator.sionna_scene import sionna_scene, stand_back
+from simulator.export.sionna_scene import sionna_scene, stand_back
 
 import sionna.rt as rt  # isort: skip  (the simulator chooses the backend first)
 

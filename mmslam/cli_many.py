@@ -36,7 +36,7 @@ def dataset(
     with told_clearly():
         if schema:
             with stdout_kept_clean():
-                from simulator.dataset_config import DatasetConfig
+                from simulator.dataset.config import DatasetConfig
             print_json(DatasetConfig.model_json_schema())
             return
         if config is None or output is None:

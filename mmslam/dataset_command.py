@@ -12,7 +12,7 @@ import typer
 from mmslam.interruption import ResumableInterruption, interruptions_held
 from mmslam.output import OutputError
 from mmslam.work_progress import WorkProgress, told_size, told_time
-from simulator.dataset import (
+from simulator.dataset.builder import (
     DatasetJob,
     Forecast,
     Summary,
@@ -21,8 +21,8 @@ from simulator.dataset import (
     plan_dataset,
     progress_of,
 )
-from simulator.dataset_store import DatasetError
-from simulator.resumable_work import WorkError, Workers
+from simulator.dataset.store import DatasetError
+from simulator.dataset.task_runner import WorkError, Workers
 
 _TOLD_FAILURES = 10
 

@@ -76,7 +76,7 @@ def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:
 
 def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:
     with stdout_kept_clean():
-        from simulator.scene_export import MOST_FROZEN, exported_files, frozen_facets
+        from simulator.export.scene_files import MOST_FROZEN, exported_files, frozen_facets
 
         if (count := frozen_facets(scenario)) > MOST_FROZEN:
             typer.echo(
@@ -107,7 +107,7 @@ def _draw(scenario: Scenario, path: Path) -> Path:
 
     with stdout_kept_clean():
         from mmslam.pictures import DOTS_PER_INCH
-        from simulator.scenario_paths import scenario_paths
+        from simulator.scene.scenario_paths import scenario_paths
         from validation.scenario_plan import draw_scenario
         from validation.scenario_view import draw_view
 

@@ -12,7 +12,7 @@ from estimator.measurement.store import is_store
 from mmslam import output
 from mmslam.interruption import ResumableInterruption, interruptions_held
 from mmslam.work_progress import WorkProgress, told_time
-from simulator.resumable_work import WorkError, Workers, compute_in_one_thread
+from simulator.dataset.task_runner import WorkError, Workers, compute_in_one_thread
 from validation.sweep import (
     Outcome,
     SweepConfig,

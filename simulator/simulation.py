@@ -7,15 +7,15 @@ import xarray as xr
 
 from estimator.measurement.model import Echo, Measurement, Uplink
 from scenes.scenario import Scenario
-from simulator.echo import simulate_echo
-from simulator.multistatic import multistatic_echo, multistatic_scene
-from simulator.physical_optics import Ports
-from simulator.point_targets import point_echo, point_uplink
-from simulator.radio_scene import facet_ports, radio_scene
-from simulator.receiver import received
-from simulator.sights import in_space
-from simulator.truth import scenario_truth
-from simulator.uplink import simulate_uplink
+from simulator.receiver.receiver import received
+from simulator.response.echo import simulate_echo
+from simulator.response.multistatic import multistatic_echo, multistatic_scene
+from simulator.response.point_targets import point_echo, point_uplink
+from simulator.response.uplink import simulate_uplink
+from simulator.scattering.physical_optics import Ports
+from simulator.scene.array_antennas import in_space
+from simulator.scene.radio_scene import facet_ports, radio_scene
+from simulator.scene.truth import scenario_truth
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simulator.dataset import make_dataset, plan_dataset
-from simulator.resumable_work import Workers
+from simulator.dataset.builder import make_dataset, plan_dataset
+from simulator.dataset.task_runner import Workers
 
 CONFIG = """
 base = "point_scatterers"

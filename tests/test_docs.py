@@ -37,8 +37,8 @@ from mmslam.sweep_command import STORE
 from mmslam.sweep_mapping import load_mapping
 from scenes.files.loading import load_scenario
 from scenes.files.toml_writer import toml_text
-from simulator.dataset import make_dataset, plan_dataset
-from simulator.resumable_work import Workers
+from simulator.dataset.builder import make_dataset, plan_dataset
+from simulator.dataset.task_runner import Workers
 from validation.claims import ALL_CLAIMS
 from validation.sweep import Outcome, plan_sweep
 from validation.sweep_tables import error_dataset

@@ -11,9 +11,9 @@ from scenes.realisations.object_surface import Surface
 from scenes.scenario import parse_scenario
 from scenes.surfaces.primitives import grid_triangles
 from scenes.surfaces.roughness_spectrum import rough_sheet
-from simulator.facets import Facets, surface_facets
-from simulator.physical_optics import Ports, isotropic, scattered
-from simulator.radio_scene import RadioScene, radio_scene
+from simulator.geometry.facets import Facets, surface_facets
+from simulator.scattering.physical_optics import Ports, isotropic, scattered
+from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.simulation import simulate
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from simulator.code_version import code_digest, package_versions
+from simulator.dataset.provenance import code_digest, package_versions
 from validation.claim import Claim, Effort, Finding, Row, Tell
 
 OUR_PACKAGES = ("scenes", "simulator", "estimator", "validation")

@@ -29,8 +29,8 @@ from scipy.constants import speed_of_light
 from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
-from simulator.materials import Absorber
-from simulator.radio_scene import scenario_materials
+from simulator.materials.layered_media import Absorber
+from simulator.scene.radio_scene import scenario_materials
 
 HALF_POWER = 0.886
 """Width of a sinc's main lobe at half its power, over its first zero. [-]"""

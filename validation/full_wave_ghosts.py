@@ -17,11 +17,11 @@ from jaxtyping import Complex, Float
 
 from estimator.measurement.model import MeasurementError
 from scenes.realisations.object_surface import Surface
-from simulator.facets import joined, profile_surface, surface_facets
-from simulator.ghost_echo import ghost_echo, scattering_faces
-from simulator.mutual_visibility import facets_see_each_other
-from simulator.physical_optics import Ports, isotropic
-from simulator.ray_scene import build_scene, facets_visible
+from simulator.geometry.facets import joined, profile_surface, surface_facets
+from simulator.geometry.ray_scene import build_scene, facets_visible
+from simulator.multibounce.multibounce_2d import ghost_echo, scattering_faces
+from simulator.scattering.physical_optics import Ports, isotropic
+from simulator.visibility.mutual_visibility import facets_see_each_other
 from validation.full_wave_reference import read_reference
 
 LEAST_CORRELATION = 0.97

@@ -22,9 +22,9 @@ from estimator.measurement.store import read_measurement, write_measurement
 from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Noise, Scenario
 from scenes.schema.impairments import Impairments
-from simulator.code_version import code_digest, package_versions
-from simulator.dataset_config import content_text
-from simulator.receiver import received
+from simulator.dataset.config import content_text
+from simulator.dataset.provenance import code_digest, package_versions
+from simulator.receiver.receiver import received
 
 
 def without_receiver(scenario: Scenario) -> Scenario:

@@ -13,11 +13,11 @@ from jaxtyping import Float
 from scipy.constants import epsilon_0, speed_of_light
 from scipy.spatial.transform import Rotation
 
-from simulator.materials import Conductor, Dielectric, Material
-from simulator.mirrors import Mirrors
-from simulator.permittivity import ConstantPermittivity
-from simulator.specular_field import reflected_field
-from simulator.specular_paths import Blocked, find_chains
+from simulator.geometry.mirrors import Mirrors
+from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.permittivity import ConstantPermittivity
+from simulator.specular.image_method import Blocked, find_chains
+from simulator.specular.path_field import reflected_field
 
 FREQUENCY = 275e9  # [Hz]
 LIMIT_LENGTH = 1e-6  # how far lengths may be apart [m]

@@ -31,14 +31,14 @@ class PlantedError:
 PLANTED = (
     PlantedError(
         name="sign of the phase, line of sight in the simulator",
-        file="simulator/free_space.py",
+        file="simulator/specular/free_space.py",
         right="phase = np.exp(-2j * np.pi * np.remainder(",
         wrong="phase = np.exp(+2j * np.pi * np.remainder(",
         claims=("points", "line_of_sight"),
     ),
     PlantedError(
         name="sign of the phase, facets in the simulator",
-        file="simulator/frequency_sum.py",
+        file="simulator/numerics/nufft_sum.py",
         right="carrier = np.exp(-2j * np.pi * (turns - np.round(turns)))",
         wrong="carrier = np.exp(+2j * np.pi * (turns - np.round(turns)))",
         claims=("canonical_bodies", "full_wave_wall", "fig04_09_slam"),
@@ -52,7 +52,7 @@ PLANTED = (
     ),
     PlantedError(
         name="image plane 1 mm off in the simulator",
-        file="simulator/mirrors.py",
+        file="simulator/geometry/mirrors.py",
         right="points - 2.0 * heights[..., None] * self.normals[mirror]",
         wrong="points - 2.0 * (heights[..., None] + 1e-3) * self.normals[mirror]",
         claims=("specular_chains",),
@@ -88,7 +88,7 @@ PLANTED = (
     ),
     PlantedError(
         name="random phases at every position",
-        file="simulator/echo.py",
+        file="simulator/response/echo.py",
         right="    return np.asarray(echo + ghosts)\n",
         wrong="    turns = np.random.default_rng(0).random((len(echo), 1))\n"
         "    return np.asarray((echo + ghosts) * np.exp(2j * np.pi * turns))\n",

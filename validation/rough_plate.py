@@ -34,9 +34,9 @@ from scipy.constants import speed_of_light
 
 from scenes.schema.antenna import Antenna
 from scenes.schema.objects import Plate, Roughness
-from simulator.antennas import field_gain
-from simulator.facet_reflection import facet_coefficients
-from simulator.materials import Material
+from simulator.antennas.field_pattern import field_gain
+from simulator.materials.layered_media import Material
+from simulator.materials.reflection_coefficients import facet_coefficients
 
 TERMS = 30
 """Terms of the series: for s below 5 what is left out is below 1e-12. [-]"""
@@ -72,7 +72,7 @@ def mean_diffuse_power(
     roughness
         Gaussian.
     material
-        Reflects as :mod:`simulator.facet_reflection` says.
+        Reflects as :mod:`simulator.materials.reflection_coefficients` says.
     antennas
         Both ends.
     frequency

@@ -28,7 +28,7 @@ from scipy.signal import fftconvolve
 from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate, Roughness
-from simulator.sights import array_sight, user_sight
+from simulator.scene.array_antennas import array_sight, user_sight
 from validation.position_bound import (
     Plane,
     PositionBound,

@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from scenes.scenario import Scenario
-from simulator.mean_surfaces import mean_surfaces
-from simulator.mirrors import Mirrors
-from simulator.radio_scene import scenario_materials
-from simulator.ray_scene import blocked, build_scene
-from simulator.scene_mirrors import scene_mirrors
-from simulator.sights import array_sight, user_sight
-from simulator.specular_field import specular_response
-from simulator.specular_paths import find_chains
+from simulator.geometry.mean_surfaces import mean_surfaces
+from simulator.geometry.mirrors import Mirrors
+from simulator.geometry.ray_scene import blocked, build_scene
+from simulator.scene.array_antennas import array_sight, user_sight
+from simulator.scene.radio_scene import scenario_materials
+from simulator.scene.scene_mirrors import scene_mirrors
+from simulator.specular.image_method import find_chains
+from simulator.specular.path_field import specular_response
 from validation.position_bound import Plane, PositionBound, position_error_bound
 
 

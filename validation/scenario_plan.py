@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Polygon
 from scenes.scenario import Scenario
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
-from simulator.scenario_paths import ScenarioPath
+from simulator.scene.scenario_paths import ScenarioPath
 from validation import figures, views
 
 MATERIAL_COLOURS = {"absorber": "#3d3d3d", "metal": figures.MIRROR}

@@ -9,8 +9,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from scenes.scenario import Scenario
-from simulator.mean_surfaces import mean_surfaces
-from simulator.scenario_paths import ScenarioPath
+from simulator.geometry.mean_surfaces import mean_surfaces
+from simulator.scene.scenario_paths import ScenarioPath
 from validation import figures
 from validation.scenario_plan import DIELECTRIC, MATERIAL_COLOURS, TRANSMITTER, path_style
 

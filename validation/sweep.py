@@ -23,8 +23,8 @@ from scenes.sampling.sample_space import SampleSpace, open_sample_space
 from scenes.sampling.variations import Variations, load_variations
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
-from simulator.resumable_work import Result, Task, Workers, work_off
-from simulator.truth import scenario_truth
+from simulator.dataset.task_runner import Result, Task, Workers, work_off
+from simulator.scene.truth import scenario_truth
 from validation.echo_line_bound import wall_covariance_bound
 from validation.metrics import position_error, wall_errors
 from validation.noise_free import content_key, noise_free, with_receiver

@@ -9,8 +9,8 @@ from typer.testing import CliRunner, Result
 
 from mmslam import export_arrays
 from mmslam.cli import app
-from simulator.dataset import make_dataset, plan_dataset
-from simulator.resumable_work import Workers
+from simulator.dataset.builder import make_dataset, plan_dataset
+from simulator.dataset.task_runner import Workers
 
 CONFIG = """
 base = "point_scatterers"

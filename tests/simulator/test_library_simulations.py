@@ -19,7 +19,7 @@ from scenes.files.loading import load_scenario, scenario_names
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.scenario import MeshFile, Scenario
 from scenes.surfaces.facet_spacing import facet_count, mesh_facet_count
-from simulator.scene_export import exported_files
+from simulator.export.scene_files import exported_files
 from simulator.simulation import simulate
 
 AS_IT_IS = """

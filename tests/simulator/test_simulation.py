@@ -10,9 +10,9 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from estimator.measurement.model import Measurement
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
-from simulator.radio_scene import radio_scene
+from simulator.scene.radio_scene import radio_scene
+from simulator.scene.truth import scenario_truth
 from simulator.simulation import simulate
-from simulator.truth import scenario_truth
 
 WALL = {
     "kind": "plate",

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from simulator import ray_scene
+from simulator.geometry import ray_scene
 from validation.path_solver import (
     EDGE,
     LIMIT_AMPLITUDE,

@@ -9,9 +9,9 @@ from scipy.constants import speed_of_light
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from scenes.schema.objects import Plate, Roughness
-from simulator.antennas import horn_beam_width
-from simulator.materials import Conductor
-from simulator.radio_scene import scenario_materials
+from simulator.antennas.field_pattern import horn_beam_width
+from simulator.materials.layered_media import Conductor
+from simulator.scene.radio_scene import scenario_materials
 from simulator.simulation import simulate
 from validation.experiments.fig02_07_rcs_drywall import links_of, off_specular_deg
 from validation.rough_plate import coherent_loss, mean_diffuse_power, mirror_link

@@ -7,8 +7,8 @@ from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.realisations.object_surface import object_surface, plate_segment
 from scenes.scenario import Scenario
-from simulator.radio_scene import facet_ports, radio_scene
-from simulator.uplink import simulate_uplink
+from simulator.response.uplink import simulate_uplink
+from simulator.scene.radio_scene import facet_ports, radio_scene
 from validation.roughness_floor import roughness_floor
 
 SMALL = (

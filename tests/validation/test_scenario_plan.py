@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from scenes.files.loading import load_scenario
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
-from simulator.antennas import field_gain
+from simulator.antennas.field_pattern import field_gain
 from validation.scenario_plan import draw_scenario, half_power_width, outline
 
 ALONG_X = np.array([1.0, 0.0, 0.0])

@@ -4,7 +4,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import parse_scenario
-from simulator.scenario_paths import scenario_paths
+from simulator.scene.scenario_paths import scenario_paths
 from validation.scenario_plan import FAINT_DB, draw_scenario, path_style
 from validation.scenario_view import draw_view
 

@@ -8,7 +8,7 @@ import pytest
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import ScenarioError
-from simulator.resumable_work import Workers
+from simulator.dataset.task_runner import Workers
 from simulator.simulation import simulate
 from validation import noise_free as kept
 from validation import sweep

@@ -8,11 +8,11 @@ from scipy.constants import speed_of_light
 from scenes.files.loading import load_scenario
 from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario
-from simulator.facets import surface_facets
-from simulator.materials import Dielectric, reflection, transmission
-from simulator.permittivity import ConstantPermittivity
-from simulator.physical_optics import scattered
-from simulator.ray_scene import build_scene, facets_visible
+from simulator.geometry.facets import surface_facets
+from simulator.geometry.ray_scene import build_scene, facets_visible
+from simulator.materials.layered_media import Dielectric, reflection, transmission
+from simulator.materials.permittivity import ConstantPermittivity
+from simulator.scattering.physical_optics import scattered
 from validation.canonical_scatterers import half_shadowed_plate, ports
 from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.path_solver import (

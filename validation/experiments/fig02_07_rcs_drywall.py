@@ -38,7 +38,7 @@ from matplotlib.axes import Axes
 from scenes.files.loading import load_scenario, override_scenario
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
-from simulator.radio_scene import scenario_materials
+from simulator.scene.radio_scene import scenario_materials
 from simulator.simulation import simulate
 from validation.claim import Row, Tell
 from validation.rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link

@@ -40,9 +40,9 @@ from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario
 from scenes.schema.antenna import GaussianBeam
 from scenes.schema.objects import Plate
-from simulator.receiver import received
+from simulator.receiver.receiver import received
+from simulator.scene.truth import scenario_truth
 from simulator.simulation import simulate
-from simulator.truth import scenario_truth
 from validation.calibration import position_errors
 from validation.full_wave_band import band_fields
 from validation.line_source import LineSource

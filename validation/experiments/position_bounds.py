@@ -42,9 +42,9 @@ from estimator.localization.locate import locate
 from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
-from simulator.radio_scene import facet_ports, radio_scene
+from simulator.response.uplink import simulate_uplink
+from simulator.scene.radio_scene import facet_ports, radio_scene
 from simulator.simulation import simulate
-from simulator.uplink import simulate_uplink
 from validation.echo_line_bound import wall_covariance_bound
 from validation.point_scatterer import complex_noise, point_uplink
 from validation.position_bound import Plane, image_and_slopes, position_error_bound

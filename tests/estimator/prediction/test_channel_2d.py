@@ -18,9 +18,9 @@ from estimator.prediction.wall_reflection import (
     wall_reflections,
 )
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
-from simulator.materials import Conductor
-from simulator.mirrors import Mirrors, line_mirrors
-from simulator.specular_paths import find_chains
+from simulator.geometry.mirrors import Mirrors, line_mirrors
+from simulator.materials.layered_media import Conductor
+from simulator.specular.image_method import find_chains
 from validation.point_scatterer import point_echo, point_uplink
 
 FREQUENCY = 257.5e9

@@ -1,0 +1,394 @@
+"""A dataset on disk while it grows: nothing in it is ever half-written, and it can be taken up.
+
+Beside ``FILE.zarr`` lies ``FILE.zarr.unfinished`` until all samples are there::
+
+    dataset.json        what is being made; another configuration or version is refused
+    samples/N.npz       one file for each sample that is done
+    store/              the Zarr store; a block of samples is one file of it
+    blocks/B.npz        the labels of a block whose echo and uplinks are in the store
+    lock                held by the process that hands out the work
+
+Every file is written under another name, flushed to the disk and renamed. A sample is done when
+``samples/N.npz`` or its block is there; ``store`` becomes ``FILE.zarr`` in one step at the end.
+"""
+
+import fcntl
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from zarr.codecs import BloscCodec
+
+from simulator.dataset.config import differences
+from simulator.dataset.layout import LABEL_SAMPLES, Layout
+from simulator.dataset.sample import Row
+from simulator.dataset.sample_files import flush, is_whole, load_row, numbers_in, save_row
+from simulator.dataset.variables import FAILED, TEXT, Variable
+
+JOB = "dataset.json"
+IDENTITY = ("config", "base", "versions", "code")
+
+
+class DatasetError(ValueError):
+    """A dataset cannot be written or taken up; the message says why and what to do."""
+
+
+class GrowingDataset:
+    """The folder of a dataset that is being made."""
+
+    def __init__(self, target: Path, layout: Layout) -> None:
+        self.target = target
+        self.layout = layout
+        self.folder = target.with_name(target.name + ".unfinished")
+        self.store = self.folder / "store"
+
+    # What has to be there
+
+    def begin(self) -> None:
+        """Make the folder, or take it up: what is torn is removed, what is done stays.
+
+        Raises
+        ------
+        DatasetError
+            If something else lies there, or a dataset of another configuration or version.
+        """
+        if self.folder.exists() and (self.folder / JOB).is_file() and self.store.exists():
+            self._refuse_another(json.loads((self.folder / JOB).read_text(encoding="utf-8")))
+            self._clear_torn()
+            return
+        if self.folder.exists():
+            ours = {JOB, "store", "samples", "blocks", "lock"}
+            foreign = {one.name for one in self.folder.iterdir()} - ours
+            if foreign:
+                raise DatasetError(
+                    f"{self.folder} holds what mmslam did not write ({sorted(foreign)[0]}); move "
+                    "it away or choose another file"
+                )
+            for name in (JOB, "store", "samples", "blocks"):  # begun, and not ended
+                _remove(self.folder / name)
+        for name in ("samples", "blocks"):
+            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        making = self.folder / "store.part"
+        _remove(making)
+        create_store(making, self.layout)
+        self._write_job()
+        making.rename(self.store)
+
+    def reopen(self) -> tuple[int, ...]:
+        """Turn the finished dataset into an unfinished one that lacks its failed samples.
+
+        Returns
+        -------
+        The samples that are to be made again; none: nothing was changed.
+        """
+        failed = tuple(failed_samples(self.target))
+        if not failed:
+            return ()
+        for name in (JOB, "store", "samples", "blocks"):
+            _remove(self.folder / name)
+        for name in ("samples", "blocks"):
+            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        again = {sample // self.layout.block for sample in failed}
+        for block in range(self.layout.blocks):
+            samples = self.layout.block_samples(block)
+            if block not in again:
+                self._write_block(block, _read_labels(self.target, self.layout, samples))
+                continue
+            for sample in samples:
+                if sample not in failed:
+                    self.put(sample, _read_row(self.target, self.layout, sample))
+        self._write_job()
+        self.target.rename(self.store)
+        return failed
+
+    def discard(self) -> None:
+        """Remove the folder: the dataset itself is whole."""
+        _remove(self.folder)
+
+    def forget_failed(self) -> None:
+        """Have the failed samples of the unfinished dataset made again."""
+        for sample in self.staged():
+            if int(self._staged_row(sample)["status"]) == FAILED:
+                self._sample_file(sample).unlink()
+        for block in self.collected():
+            labels = load_row(self._block_file(block))
+            if not np.any(labels["status"] == FAILED):
+                continue
+            for at, sample in enumerate(self.layout.block_samples(block)):
+                if int(labels["status"][at]) != FAILED:
+                    row = {key: _only(values[at : at + 1]) for key, values in labels.items()}
+                    self.put(sample, row | _read_large(self.store, self.layout, sample))
+            self._block_file(block).unlink()
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep others from the folder; the lock ends with the process, however that ends.
+
+        Raises
+        ------
+        DatasetError
+            If another process holds it.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with (self.folder / "lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise DatasetError(
+                    f"{self.target} is being made by another process; wait for it, or choose "
+                    "another file"
+                ) from None
+            yield
+
+    # What is done
+
+    def staged(self) -> list[int]:
+        """Return the samples that are done, but not in the store yet."""
+        return sorted(numbers_in(self.folder / "samples"))
+
+    def collected(self) -> list[int]:
+        """Return the blocks that are in the store."""
+        return sorted(numbers_in(self.folder / "blocks"))
+
+    def done(self) -> np.ndarray:
+        """Tell for every sample whether it is done. [bool]."""
+        done = np.zeros(self.layout.samples, dtype=bool)
+        done[self.staged()] = True
+        for block in self.collected():
+            samples = self.layout.block_samples(block)
+            done[samples.start : samples.stop] = True
+        return done
+
+    def failed(self) -> list[int]:
+        """Return the samples that are done and have failed."""
+        found = [n for n in self.staged() if int(self._staged_row(n)["status"]) == FAILED]
+        for block in self.collected():
+            status = load_row(self._block_file(block), only=("status",))["status"]
+            start = self.layout.block_samples(block).start
+            found += [start + int(at) for at in np.flatnonzero(status == FAILED)]
+        return sorted(found)
+
+    # What workers do
+
+    def put(self, sample: int, row: Row) -> None:
+        """Keep a sample's row."""
+        save_row(self._sample_file(sample), row)
+
+    def collect(self, block: int) -> None:
+        """Move all samples of a block from their files into the store.
+
+        Done again, after a worker was killed over it, it goes on where that one was.
+        """
+        samples = self.layout.block_samples(block)
+        if self._block_file(block).exists():  # written last: the store holds the block
+            self._unstage(samples)
+            return
+        rows = [self._staged_row(sample) for sample in samples]
+        group = zarr.open_group(self.store, mode="r+")
+        for variable in self.layout.variables:
+            if variable.large:
+                array = stored_array(group, variable.key)
+                array[samples.start : samples.stop] = np.stack(
+                    [row.pop(variable.key) for row in rows]
+                )
+                flush(self.store / variable.key / "c" / str(block))
+        self._write_block(block, {key: np.stack([row[key] for row in rows]) for key in rows[0]})
+        self._unstage(samples)
+
+    def finish(self) -> None:
+        """Write the labels into the store, and put it where it belongs."""
+        group = zarr.open_group(self.store, mode="r+")
+        per_chunk = LABEL_SAMPLES // self.layout.block
+        small = [one for one in self.layout.variables if not one.large]
+        for first in range(0, self.layout.blocks, per_chunk):
+            blocks = range(first, min(first + per_chunk, self.layout.blocks))
+            parts = [load_row(self._block_file(block)) for block in blocks]
+            start = blocks.start * self.layout.block
+            for variable in small:
+                values = np.concatenate([part[variable.key] for part in parts])
+                array = stored_array(group, variable.key)
+                array[start : start + len(values)] = _as_stored(variable, values)
+        for variable in small:
+            flush(self.store / variable.key)
+        self.store.rename(self.target)
+        _remove(self.folder)
+
+    # Its own files
+
+    def _sample_file(self, sample: int) -> Path:
+        return self.folder / "samples" / f"{sample}.npz"
+
+    def _block_file(self, block: int) -> Path:
+        return self.folder / "blocks" / f"{block}.npz"
+
+    def _unstage(self, samples: range) -> None:
+        for sample in samples:
+            self._sample_file(sample).unlink(missing_ok=True)
+
+    def _staged_row(self, sample: int) -> Row:
+        return load_row(self._sample_file(sample))
+
+    def _write_block(self, block: int, labels: Row) -> None:
+        save_row(self._block_file(block), labels)
+
+    def _write_job(self) -> None:
+        text = json.dumps({key: self.layout.attributes[key] for key in IDENTITY})
+        part = self.folder / f"{JOB}.part"
+        part.write_text(text, encoding="utf-8")
+        flush(part)
+        part.rename(self.folder / JOB)
+
+    def _refuse_another(self, job: Mapping[str, str]) -> None:
+        mine = {key: self.layout.attributes[key] for key in IDENTITY}
+        if found := differences(mine, job):
+            raise DatasetError(
+                f"{self.folder} was begun with another {', another '.join(found)}; finish it with "
+                "that, or remove the folder, or choose another file"
+            )
+
+    def _clear_torn(self) -> None:
+        """Remove what a process left behind that ended in the middle of something."""
+        for folder in (self.folder, self.folder / "samples", self.folder / "blocks"):
+            folder.mkdir(exist_ok=True)
+            for entry in folder.iterdir():
+                if ".part" in entry.suffixes or entry.name.endswith(".part"):
+                    _remove(entry)
+        for partial in self.store.rglob("*.partial"):
+            partial.unlink()
+        collected = set(self.collected())
+        for sample in self.staged():
+            path = self._sample_file(sample)
+            if sample // self.layout.block in collected or not is_whole(path):
+                path.unlink()
+        for block in collected:
+            if not is_whole(self._block_file(block)):
+                self._block_file(block).unlink()
+
+
+def create_store(path: Path, layout: Layout) -> None:
+    """Write an empty dataset: all metadata, and what is the same in all samples.
+
+    Parameters
+    ----------
+    path
+        A folder that does not exist yet.
+    layout
+        What it will hold.
+    """
+    root = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
+    names = {one.group for one in layout.variables} | {one.group for one in layout.constants}
+    groups = {"": root} | {name: root.create_group(name) for name in sorted(names - {""})}
+    for constant in layout.constants:
+        text = constant.values.dtype.kind == "T"
+        array = groups[constant.group].create_array(
+            constant.name,
+            shape=constant.values.shape,
+            dtype=str if text else constant.values.dtype,
+            chunks=constant.values.shape,
+            fill_value="" if text else float("nan"),
+            dimension_names=constant.dimensions,
+            attributes=dict(constant.attributes),
+        )
+        array[...] = constant.values
+    for variable in layout.variables:
+        _create(groups[variable.group], variable, layout)
+
+
+def failed_samples(path: Path) -> Iterator[int]:
+    """Yield the samples of a finished dataset that could not be made."""
+    array = stored_array(zarr.open_group(path, mode="r"), "status")
+    for start in range(0, array.shape[0], LABEL_SAMPLES):
+        status = np.asarray(array[start : start + LABEL_SAMPLES])
+        for at in np.flatnonzero(status == FAILED):
+            yield start + int(at)
+
+
+def stored_array(group: zarr.Group, key: str) -> zarr.Array[Any]:
+    """Open an array of a dataset."""
+    found = group[key]
+    assert isinstance(found, zarr.Array)  # the store is one that create_store made
+    return found
+
+
+def codec(variable: Variable) -> BloscCodec:
+    """Return how a large variable is compressed.
+
+    The bytes of a number are sorted by their weight first: signs and exponents are alike, the
+    rest of a noisy sample is not. Losslessly, some 10 % is all there is to gain.
+    """
+    part = np.dtype(variable.type).itemsize // 2
+    return BloscCodec(cname="zstd", clevel=3, shuffle="shuffle", typesize=part)
+
+
+def _create(group: zarr.Group, variable: Variable, layout: Layout) -> None:
+    shape = (layout.samples, *variable.shape)
+    names = ("sample", *variable.dimensions)
+    if variable.large:
+        group.create_array(
+            variable.name,
+            shape=shape,
+            dtype=variable.type,
+            chunks=(1, *variable.shape),
+            shards=(layout.block, *variable.shape),
+            compressors=[codec(variable)],
+            fill_value=variable.missing,
+            dimension_names=names,
+            attributes=dict(variable.attributes),
+        )
+        return
+    group.create_array(
+        variable.name,
+        shape=shape,
+        dtype=str if variable.type == TEXT else variable.type,
+        chunks=(min(LABEL_SAMPLES, layout.samples), *variable.shape),
+        fill_value=variable.missing,
+        dimension_names=names,
+        attributes=dict(variable.attributes),
+    )
+
+
+def _as_stored(variable: Variable, values: np.ndarray) -> np.ndarray:
+    return values.astype(np.dtypes.StringDType()) if variable.type == TEXT else values
+
+
+def _read_labels(store: Path, layout: Layout, samples: range) -> Row:
+    group = zarr.open_group(store, mode="r")
+    found = {}
+    for variable in layout.variables:
+        if not variable.large:
+            array = stored_array(group, variable.key)
+            found[variable.key] = np.asarray(array[samples.start : samples.stop])
+    return found
+
+
+def _read_large(store: Path, layout: Layout, sample: int) -> Row:
+    group = zarr.open_group(store, mode="r")
+    found = {}
+    for variable in layout.variables:
+        if variable.large:
+            array = stored_array(group, variable.key)
+            found[variable.key] = np.asarray(array[sample])
+    return found
+
+
+def _read_row(store: Path, layout: Layout, sample: int) -> Row:
+    labels = _read_labels(store, layout, range(sample, sample + 1))
+    alone = {key: _only(values) for key, values in labels.items()}
+    return alone | _read_large(store, layout, sample)
+
+
+def _only(values: np.ndarray) -> np.ndarray:
+    """Take the leading dimension away; of texts too, which an index would turn into `str`."""
+    return values.reshape(values.shape[1:])
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

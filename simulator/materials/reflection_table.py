@@ -1,0 +1,77 @@
+"""Reflection coefficients of many facets at many frequencies, interpolated over the angle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex64, Float, Float32, Int
+
+from simulator.materials.layered_media import Conductor, Material, reflection
+
+TABLE_ACCURACY = 1e-5
+"""Largest error of a coefficient half way between two angles of the table. [-]"""
+
+MOST_ANGLES = 2**15
+"""Most angles of a table: within a degree of grazing, the last waves of a slab that hardly
+absorbs are smoothed. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Angles:
+    """Where cosines of incidence lie in a table: between which two of its angles."""
+
+    below: Int[np.ndarray, "*n"]
+    share: Float32[np.ndarray, "*n"]  # of the angle above
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReflectionTable:
+    """Coefficients of the field along z, at cosines of incidence evenly spaced from 0 to 1."""
+
+    samples: Complex64[np.ndarray, "freqs angles"]
+
+    def places(self, cosines: Float[np.ndarray, "*n"]) -> Angles:
+        """Look up where cosines lie in the table."""
+        steps = cosines * (self.samples.shape[1] - 1)
+        below = np.minimum(steps.astype(np.int32), max(self.samples.shape[1] - 2, 0))
+        return Angles(below=below, share=(steps - below).astype(np.float32))
+
+    def at(self, angles: Angles, frequency: int | slice) -> Complex64[np.ndarray, "..."]:
+        """Interpolate at one of the frequencies [*n], or at some [freqs, *n]; n may be 1."""
+        row = self.samples[frequency]
+        if row.shape[-1] == 1:
+            return row.reshape(*row.shape[:-1], *(1 for _ in angles.below.shape))
+        low = row[..., angles.below]
+        return np.asarray(low + (row[..., angles.below + 1] - low) * angles.share)
+
+
+def reflection_table(
+    material: Material, frequencies: Float[np.ndarray, " freqs"]
+) -> ReflectionTable:
+    """Tabulate a material's coefficient for the field along z.
+
+    Parameters
+    ----------
+    material
+        What reflects.
+    frequencies
+        Any grid. [Hz]
+
+    Returns
+    -------
+    The table of fewest angles whose error is below :data:`TABLE_ACCURACY`; a single one for a
+    conductor.
+    """
+    if isinstance(material, Conductor):
+        return ReflectionTable(samples=np.full((frequencies.size, 1), -1.0, np.complex64))
+    some = frequencies[:: max(1, frequencies.size // 8)]
+    count = 64
+    while count < MOST_ANGLES:
+        exact = reflection(material, some, np.linspace(0.0, 1.0, 2 * count + 1)).te
+        tried = (exact[:-1:2] + exact[2::2]) / 2
+        if float(np.abs(tried - exact[1::2]).max()) <= TABLE_ACCURACY:
+            break
+        count *= 2
+    cosines = np.linspace(0.0, 1.0, count + 1)
+    return ReflectionTable(
+        samples=reflection(material, frequencies, cosines).te.T.astype(np.complex64)
+    )

@@ -1,0 +1,186 @@
+r"""How few frequencies carry a band: waves whose delays lie close together vary slowly over it.
+
+Once a common delay is taken out of contributions that lie within an interval of delays, they
+are interpolated from a few Chebyshev nodes; where that takes as many frequencies as there are,
+every frequency is worked out.
+"""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import finufft
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.fft import dct
+
+from simulator.materials.layered_media import Conductor, Material, reflection
+from simulator.materials.reflection_coefficients import STEEP
+from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
+
+CHAIN_ACCURACY = 1e-4
+"""Error of interpolation over the band, and of the sum, over the strength of the contributions.
+Chains are summed in single precision and by physical optics, which is good to some 1e-2. [-]"""
+
+MOST_NODES = 4096
+"""Nodes that a chain is tried out at; one that needs more is worked out at every frequency."""
+
+INCIDENCES = (STEEP, 0.3, 0.5, 0.7, 0.85, 1.0)
+"""Cosines of incidence that surfaces are tried out at. [-]"""
+
+
+@dataclass(frozen=True)
+class EveryFrequency:
+    """Sums contributions whose amplitudes are known at every frequency."""
+
+    frequencies: Float[np.ndarray, " freqs"]
+
+    @property
+    def nodes(self) -> Float[np.ndarray, " nodes"]:
+        """Where the amplitudes are known: everywhere."""
+        return self.frequencies
+
+    def __call__(
+        self,
+        delays: Float[np.ndarray, " sources"],
+        amplitudes: Complex[np.ndarray, "freqs sources"],
+    ) -> Complex[np.ndarray, " freqs"]:
+        """Sum ``amplitudes`` delayed by ``delays``."""
+        turns = self.frequencies[:, None] * delays
+        phasors = np.exp(-2j * np.pi * (turns - np.rint(turns)))
+        return np.asarray(np.einsum("fs,fs->f", amplitudes, phasors))
+
+
+@dataclass(frozen=True)
+class FewFrequencies:
+    """Sums contributions whose amplitudes are known at Chebyshev nodes; safe in several threads.
+
+    The sum itself, less its mean delay, is worked out at few frequencies too, by a non-uniform
+    transform from delays to nodes, and interpolated.
+    """
+
+    frequencies: Float[np.ndarray, " freqs"]
+    nodes: Float[np.ndarray, " nodes"]
+    _bases: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(
+        default_factory=dict, repr=False
+    )
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    def __call__(
+        self,
+        delays: Float[np.ndarray, " sources"],
+        amplitudes: Complex[np.ndarray, "nodes sources"],
+    ) -> Complex[np.ndarray, " freqs"]:
+        """Sum ``amplitudes`` delayed by ``delays`` [s]."""
+        if delays.size == 0:
+            return np.zeros(self.frequencies.size, dtype=np.complex128)
+        start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
+        middle = (float(delays.min()) + float(delays.max())) / 2
+        needed = nodes_for_chain(float(np.ptp(delays)), (), start, stop) + self.nodes.size
+        points, inner, outer = self._basis(-(-needed // 32) * 32)
+        centre = (start + stop) / 2
+        turns = centre * (delays - middle)
+        carried = amplitudes * np.exp(-2j * np.pi * (turns - np.rint(turns)))
+        sums = finufft.nufft1d3(
+            2 * np.pi * (delays - middle),
+            np.ascontiguousarray(carried, dtype=np.complex128),
+            points - centre,
+            eps=CHAIN_ACCURACY / 10,
+            isign=-1,
+            nthreads=1,
+        )
+        sampled = np.einsum("mp,mp->p", inner, sums.reshape(self.nodes.size, -1))
+        turns = self.frequencies * middle
+        # Not by matrix product: its rounding would depend on the number of threads.
+        spectrum = np.einsum("pf,p->f", outer, sampled)
+        return np.asarray(spectrum * np.exp(-2j * np.pi * (turns - np.rint(turns))))
+
+    def _basis(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points at which the sum is worked out; from the nodes to them; from them onward."""
+        with self._lock:
+            if count not in self._bases:
+                start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
+                points = chebyshev_nodes(start, stop, count)
+                self._bases[count] = (
+                    points,
+                    barycentric_basis(self.nodes, points),
+                    barycentric_basis(points, self.frequencies),
+                )
+            return self._bases[count]
+
+
+def few_frequencies(
+    frequencies: Float[np.ndarray, " freqs"],
+    spread: float,
+    materials: Sequence[Material],
+    pattern_nodes: int,
+    interpolate: bool,
+) -> FewFrequencies | EveryFrequency:
+    """Choose at how few frequencies waves have to be known to be summed over the band.
+
+    Parameters
+    ----------
+    frequencies
+        Uniform grid. [Hz]
+    spread
+        By how much the lengths of paths differ that arrive at one facet. [m]
+    materials
+        What reflects them.
+    pattern_nodes
+        Frequencies that the patterns of the two antennas have to be known at, in all.
+    interpolate
+        Whether few frequencies are wanted.
+
+    Returns
+    -------
+    The sum over the band of contributions known at its ``nodes``: all frequencies, if it
+    takes no fewer.
+    """
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    count = nodes_for_chain(spread / speed_of_light, materials, start, stop) + pattern_nodes - 2
+    if interpolate and count < frequencies.size:
+        return FewFrequencies(frequencies, chebyshev_nodes(start, stop, count))
+    return EveryFrequency(frequencies)
+
+
+def nodes_for_chain(
+    delay_spread: float, materials: Sequence[Material], start: float, stop: float
+) -> int:
+    r"""Count the Chebyshev nodes that interpolate what a chain of surfaces returns over a band.
+
+    That is a delay, within ± half the spread, times the coefficients of all surfaces. The error
+    of interpolation at M nodes is at most twice the sum of the moduli of the Chebyshev
+    coefficients from the M-th on (L. N. Trefethen, *Approximation Theory and Approximation
+    Practice*, theorem 4.2); they are worked out for the longest and the shortest delay, at
+    several angles of incidence.
+
+    Parameters
+    ----------
+    delay_spread
+        Width of the interval of delays. [s]
+    materials
+        Of the surfaces.
+    start, stop
+        The band. [Hz]
+
+    Returns
+    -------
+    The fewest whose error is below :data:`CHAIN_ACCURACY`.
+    """
+    half_phase = np.pi * delay_spread * (stop - start) / 2
+    size = 64
+    while size < MOST_NODES and size < 2 * half_phase + 64 * (1 + len(materials)):
+        size *= 2
+    points = chebyshev_nodes(start, stop, size)[::-1]
+    across = (2 * points - start - stop) / (stop - start)
+    product = np.ones((len(INCIDENCES), size), dtype=np.complex128)
+    for material in materials:
+        if not isinstance(material, Conductor):
+            product *= reflection(material, points, np.array(INCIDENCES)).te
+    both = np.exp(1j * half_phase * np.array([1.0, -1.0])[:, None, None] * across) * product
+    # dct() takes the nodes from the end of the interval on: from cos(π/2K) down.
+    coefficients = np.abs(dct(both.real, axis=-1) + 1j * dct(both.imag, axis=-1)) / size
+    left_out = 2 * np.cumsum(coefficients[..., ::-1], axis=-1)[..., ::-1].max(axis=(0, 1))
+    short = np.flatnonzero(left_out > CHAIN_ACCURACY)
+    return max(1, int(short[-1]) + 1) if short.size else 1

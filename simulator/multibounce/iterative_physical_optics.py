@@ -1,0 +1,397 @@
+r"""The field that antennas send to the facets of one surface over the facets of another.
+
+Line facets (2-D). With the free-space link of a line source, :math:`G = g_0 e^{-jkr}/\sqrt r`,
+:math:`g_0 = e^{-j\pi/4}/\sqrt{8\pi k}`, a field is written :math:`h = g_0 \eta`. A wall's facets
+w take a wave onward to the facets q of a target by physical optics, in the reciprocal form,
+
+.. math:: \eta_q = \sqrt{\tfrac{k}{8\pi}}\, e^{j\pi/4} \sum_w \Gamma_w
+          (\cos\theta_{in} + \cos\theta_{out})\, \eta_w \frac{e^{-jk r_{wq}}}{\sqrt{r_{wq}}}\, ds_w
+
+so that a long flat mirror returns :math:`\Gamma/\sqrt L` over a path of total length L. Since
+each contribution arrives from its own direction, its derivative along the normal, over jk, is
+the contribution times the cosine of its angle of incidence: the *slope* of the wave. Both are
+what the next surface needs, so that chains of surfaces are made by repetition.
+
+The sum over wall facets is a product of matrices at each frequency, of far smaller ones between
+blocks of facets that are far apart (:mod:`simulator.numerics.butterfly`). Once the delay of a path
+in the middle of the contributions' is taken out, the field varies slowly with frequency.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Complex64, Float, Float32, Int
+from scipy.constants import speed_of_light
+from threadpoolctl import threadpool_limits
+
+from estimator.compute.engine import thread_count
+from simulator.geometry.facets import Facets
+from simulator.materials.layered_media import Material
+from simulator.materials.reflection_table import reflection_table
+from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_planned
+from simulator.scattering.physical_optics import Ports
+
+COLUMNS_AT_ONCE = 1024
+"""Facets of a target whose single links with a block of a wall are prepared together."""
+
+LINKS_HELD = 2**24
+"""Single links whose geometry is held for all frequencies: 340 MB. [-]"""
+
+FACTOR_BYTES = 2**30
+"""What waves at one frequency may take in all threads. [byte]"""
+
+GROUP_WIDTH = 1e-3
+"""Wall facets are taken together over this length to bound the lengths of paths. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Face:
+    """One side of a surface of line facets."""
+
+    centres: Float[np.ndarray, "facets 2"]  # [m]
+    normals: Float[np.ndarray, "facets 2"]  # unit vectors, to the side that scatters
+    sizes: Float[np.ndarray, " facets"]  # what each stands for in a sum over the surface [m]
+    edges: Float[np.ndarray, "facets 2"]  # [m]
+    source: Int[np.ndarray, " facets"]  # index of each facet in the whole set
+    surface: int  # which object the face belongs to
+    side: int  # 1: outer, or first; -1: the back of an open surface
+    material: Material
+
+    @property
+    def count(self) -> int:
+        """Number of facets."""
+        return len(self.sizes)
+
+    def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Face":
+        """Choose some of the facets."""
+        return Face(
+            **{
+                name: getattr(self, name)[chosen]
+                for name in ("centres", "normals", "sizes", "edges", "source")
+            },
+            surface=self.surface,
+            side=self.side,
+            material=self.material,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wave:
+    """Field of ports at the facets of a face; zero where nothing arrives.
+
+    The delay of :attr:`middle` is taken out of it.
+    """
+
+    strength: Complex64[np.ndarray, "#nodes ports facets"]  # [m^-1/2]
+    slope: Complex64[np.ndarray, "#nodes ports facets"]  # derivative along the normal, over jk
+    bounds: "Bounds"
+
+    @property
+    def middle(self) -> Float[np.ndarray, "ports facets"]:
+        """Length whose delay is taken out. [m]."""
+        return self.bounds.middle
+
+    def part(self, facets: slice | Int[np.ndarray, " chosen"], port: int) -> "Wave":
+        """Choose one port and some facets; a single port's wave serves all ports."""
+        row = slice(port, port + 1) if self.strength.shape[1] > 1 else slice(None)
+        return Wave(
+            strength=self.strength[:, row, facets],
+            slope=self.slope[:, row, facets],
+            bounds=self.bounds.part(facets, row),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """Between which lengths lie the paths from ports to the facets of a face."""
+
+    shortest: Float[np.ndarray, "ports facets"]  # 0 where nothing arrives [m]
+    longest: Float[np.ndarray, "ports facets"]  # [m]
+    origins: Float[np.ndarray, "ports facets 2"]  # where the shortest path comes from [m]
+
+    @property
+    def middle(self) -> Float[np.ndarray, "ports facets"]:
+        """Length half way between the shortest and the longest. [m]."""
+        middle: np.ndarray = (self.shortest + self.longest) / 2
+        return middle
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of lengths at one facet. [m]."""
+        return float((self.longest - self.shortest).max(initial=0.0))
+
+    def part(
+        self, facets: slice | Int[np.ndarray, " chosen"], ports: slice = slice(None)
+    ) -> "Bounds":
+        """Choose some of the facets, and of the ports."""
+        return Bounds(
+            shortest=self.shortest[ports, facets],
+            longest=self.longest[ports, facets],
+            origins=self.origins[ports, facets],
+        )
+
+
+def two_faces(
+    facets: Facets, chosen: Int[np.ndarray, " chosen"], *, surface: int, material: Material
+) -> tuple[Face, ...]:
+    """Return the sides of a surface that scatter: the outer one, or both of an open surface."""
+    sides = (1, -1) if bool(facets.two_sided[chosen].any()) else (1,)
+    return tuple(
+        Face(
+            centres=facets.centres[chosen, :2],
+            normals=side * facets.normals[chosen, :2],
+            sizes=facets.sizes[chosen],
+            edges=facets.edges[chosen, 0, :2],
+            source=chosen,
+            surface=surface,
+            side=side,
+            material=material,
+        )
+        for side in sides
+    )
+
+
+def quadrature(face: Face, count: int) -> Face:
+    """Replace each facet by the points of its Gauss rule: the phase over it is not constant."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    points = face.centres[:, None] + nodes[:, None] / 2 * face.edges[:, None]
+    repeated = face.part(np.repeat(np.arange(face.count), count))
+    return Face(
+        centres=points.reshape(-1, 2),
+        normals=repeated.normals,
+        sizes=(face.sizes[:, None] * weights / 2).ravel(),
+        edges=repeated.edges,
+        source=repeated.source,
+        surface=face.surface,
+        side=face.side,
+        material=face.material,
+    )
+
+
+def direct(face: Face, ports: Ports, nodes: Float[np.ndarray, " nodes"]) -> Wave:
+    """Return the free-space wave of ports at the facets that they see from the front.
+
+    Parameters
+    ----------
+    face
+        Where the wave arrives.
+    ports
+        Antennas, with the visibility of the whole set of facets.
+    nodes
+        Frequencies that a pattern which varies over the band is sampled at. [Hz]
+    """
+    towards = ports.positions[:, None, :2] - face.centres
+    distance = np.sqrt(np.einsum("pfx,pfx->pf", towards, towards))
+    cosine = np.einsum("pfx,fx->pf", towards, face.normals) / distance
+    lit = ports.visible[:, face.source] & (cosine > 0)
+    outward = np.zeros((face.count, 3))
+    gains = []
+    for index in range(len(ports.positions)):
+        outward[:, :2] = -towards[index] / distance[index, :, None]
+        gains.append(ports.pattern(outward, distance[index], nodes))
+    gain = np.stack(gains, axis=1)
+    strength = (gain * np.where(lit, 1 / np.sqrt(distance), 0.0)).astype(np.complex64)
+    length = np.where(lit, distance, 0.0)
+    origins = np.broadcast_to(ports.positions[:, None, :2], towards.shape)
+    return Wave(
+        strength=strength,
+        slope=strength * cosine.astype(np.float32),
+        bounds=Bounds(shortest=length, longest=length, origins=origins),
+    )
+
+
+def onward_bounds(
+    arriving: Bounds, wall: Face, target: Face, seen: Bool[np.ndarray, "wall target"]
+) -> Bounds:
+    """Bound the lengths of the paths from the ports over a wall to a target's facets.
+
+    Parameters
+    ----------
+    arriving
+        Lengths of the paths to the wall.
+    wall, target
+        The two faces.
+    seen
+        Which facets of the wall and of the target see each other.
+    """
+    firsts = _groups(wall)
+    members = np.diff(np.append(firsts, wall.count))
+    middles = wall.centres[firsts + members // 2]
+    group = np.repeat(np.arange(len(firsts)), members)
+    radius = np.zeros(len(firsts))
+    np.maximum.at(radius, group, np.linalg.norm(wall.centres - middles[group], axis=-1))
+    hidden = ~np.logical_or.reduceat(seen, firsts, axis=0)
+    apart = np.linalg.norm(middles[:, None] - target.centres, axis=-1)
+    nearest, farthest = apart - radius[:, None], apart + radius[:, None]
+    nearest[hidden], farthest[hidden] = np.inf, -np.inf
+    lit = arriving.longest > 0
+    low = np.minimum.reduceat(np.where(lit, arriving.shortest, np.inf), firsts, axis=1)
+    high = np.maximum.reduceat(np.where(lit, arriving.longest, -np.inf), firsts, axis=1)
+
+    def of_port(port: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        lengths = low[port, :, None] + nearest
+        first = np.argmin(lengths, axis=0)
+        shortest = np.take_along_axis(lengths, first[None], axis=0)[0]
+        longest = (high[port, :, None] + farthest).max(axis=0)
+        return shortest, longest, middles[first]
+
+    with ThreadPoolExecutor(thread_count()) as pool:
+        found = list(pool.map(of_port, range(len(low))))
+    shortest, longest, origins = (np.stack(parts) for parts in zip(*found, strict=True))
+    arrives = np.isfinite(shortest)
+    return Bounds(
+        shortest=np.where(arrives, np.maximum(shortest, 0.0), 0.0),
+        longest=np.where(arrives, longest, 0.0),
+        origins=origins,
+    )
+
+
+def onward(
+    wave: Wave,
+    wall: Face,
+    target: Face,
+    seen: Bool[np.ndarray, "wall target"],
+    bounds: Bounds,
+    nodes: Float[np.ndarray, " nodes"],
+) -> Wave:
+    """Take a wave from a wall to a target by physical optics on the wall's facets.
+
+    Parameters
+    ----------
+    wave
+        What arrives at the wall: at these nodes, or the same at all frequencies.
+    wall, target, seen
+        The two faces, and which of their facets see each other.
+    bounds
+        Lengths of the paths, after :func:`onward_bounds`.
+    nodes
+        Frequencies. [Hz]
+    """
+    ports, columns = len(bounds.shortest), target.count
+    shape = (nodes.size, ports, columns)
+    strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
+    # The mirror that would lead from the ports to the middle of what is seen of the target.
+    towards = target.centres[seen.any(axis=0)].mean(axis=0) if seen.any() else wall.centres[0]
+    table = reflection_table(wall.material, nodes)
+    incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
+    plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
+    single = _SingleLinks.left_by(plan, wall, target)
+    sizes, outward, inward = (
+        values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
+    )
+
+    def at_node(node: int) -> None:
+        frequency = float(nodes[node])
+        here = min(node, len(wave.strength) - 1)
+        reflected = table.at(incidence, node) * phasor(wave.middle * (-frequency / speed_of_light))
+        reflected = reflected * sizes
+        monopoles, dipoles = reflected * wave.slope[here], reflected * wave.strength[here]
+        sources = np.stack([monopoles, dipoles * outward[:, 0], dipoles * outward[:, 1]])
+        field, from_x, from_y = sum_planned(plan, sources, columns, frequency)
+        along_normal = inward[:, 0] * from_x + inward[:, 1] * from_y
+        for some in single:
+            received = some.received(monopoles[:, some.rows], dipoles[:, some.rows], frequency)
+            field[:, some.columns] += received[0]
+            along_normal[:, some.columns] += received[1]
+        scale = math.sqrt(frequency / (4 * speed_of_light)) * np.exp(0.25j * np.pi)
+        turned = phasor(bounds.middle * (frequency / speed_of_light)) * np.complex64(scale)
+        np.multiply(turned, field, out=strength[node])
+        np.multiply(turned, along_normal, out=slope[node])
+
+    needed = 64 * ports * (wall.count + columns)
+    workers = max(1, min(thread_count(), FACTOR_BYTES // needed))
+    # BLAS threads of their own would spin against these: up to 20 times slower.
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
+        list(pool.map(at_node, range(nodes.size)))
+    return Wave(strength=strength, slope=slope, bounds=bounds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SingleLinks:
+    """Links between facets that are summed one by one."""
+
+    rows: Int[np.ndarray, " wall"]
+    columns: Int[np.ndarray, " target"]
+    distance: Float[np.ndarray, "wall target"]  # [m]
+    spreading: Float32[np.ndarray, "wall target"]  # 0 where hidden [m^-1/2]
+    leaves: Float32[np.ndarray, "wall target"]  # cosine to the wall's normal
+    arrives: Float32[np.ndarray, "wall target"]  # cosine to the target's
+
+    @classmethod
+    def left_by(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterable[_SingleLinks]":
+        """Prepare the links that the blocks leave, some at a time; once, unless too many."""
+        if int(plan.left.sum()) > LINKS_HELD:
+            return _Anew(lambda: cls._prepared(plan, wall, target))
+        return list(cls._prepared(plan, wall, target))
+
+    @classmethod
+    def _prepared(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterator[_SingleLinks]":
+        for sender in plan.senders:
+            left = plan.left[sender.members]
+            rows, columns = sender.members[left.any(axis=1)], np.flatnonzero(left.any(axis=0))
+            for first in range(0, columns.size, COLUMNS_AT_ONCE):
+                some = columns[first : first + COLUMNS_AT_ONCE]
+                between = target.centres[some] - wall.centres[rows, None]
+                # Facets that touch have no distance, and no far field either.
+                distance = np.maximum(np.linalg.norm(between, axis=-1), wall.sizes[rows, None] / 2)
+                direction = between / distance[..., None]
+                links = plan.left[np.ix_(rows, some)] / np.sqrt(distance)
+                leaves = np.einsum("wqx,wx->wq", direction, wall.normals[rows])
+                arrives = -np.einsum("wqx,qx->wq", direction, target.normals[some])
+                yield cls(
+                    rows=rows,
+                    columns=some,
+                    distance=distance,
+                    spreading=links.astype(np.float32),
+                    leaves=leaves.astype(np.float32),
+                    arrives=arrives.astype(np.float32),
+                )
+
+    def received(
+        self,
+        monopoles: Complex64[np.ndarray, "ports wall"],
+        dipoles: Complex64[np.ndarray, "ports wall"],
+        frequency: float,
+    ) -> tuple[Complex64[np.ndarray, "ports target"], Complex64[np.ndarray, "ports target"]]:
+        """Sum the field, and the field times the cosine at the target."""
+        links = self.spreading * phasor(self.distance * (-frequency / speed_of_light))
+        turned = links * self.leaves
+        strength = monopoles @ links + dipoles @ turned
+        slope = monopoles @ (links * self.arrives) + dipoles @ (turned * self.arrives)
+        return strength, slope
+
+
+@dataclass(frozen=True)
+class _Anew:
+    """Makes its items anew each time it is run through."""
+
+    make: "Callable[[], Iterator[_SingleLinks]]"
+
+    def __iter__(self) -> "Iterator[_SingleLinks]":
+        return self.make()
+
+
+def half_angle_cosines(
+    face: Face,
+    one: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
+    other: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
+) -> Float[np.ndarray, "ports facets"]:
+    """Cosines of half the angle at each facet between the ways to two points. [-]."""
+    both = unit(one - face.centres) + unit(other - face.centres)
+    return np.asarray(np.minimum(np.hypot(both[..., 0], both[..., 1]) / 2, 1.0))
+
+
+def unit(vectors: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+    """Return vectors of length 1 in the same directions."""
+    unit: np.ndarray = vectors / np.hypot(vectors[..., :1], vectors[..., 1:])
+    return unit
+
+
+def _groups(wall: Face) -> np.ndarray:
+    """First facets of runs of neighbours that are about :data:`GROUP_WIDTH` long."""
+    steps = np.linalg.norm(np.diff(wall.centres, axis=0), axis=-1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.unique(along // GROUP_WIDTH, return_index=True)[1]

@@ -1,0 +1,261 @@
+r"""The echo in space over several surfaces: targets seen over mirrors, and chains of mirrors alone.
+
+A target (a body that is no plate, of at most
+:data:`simulator.scene.scene_mirrors.LARGEST_TARGET`) is lit over legs: directly, or over
+mirrors. Its facets scatter what comes over one leg into another: wall-target, target-wall,
+wall-target-wall, with the mirrors' reflection at each frequency and the coherent loss of their
+roughness. The direct way out and back is left to plain physical optics. Of a chain between two
+targets the later one is cut into facets, and the other one is a mirror. What no target is part of
+(three walls of a corner) is an image of the antenna itself.
+
+The diffuse part is that of :mod:`simulator.multibounce.diffuse_echo_3d`.
+
+What is neglected: which part of a target a leg lights is found patch by patch, from one facet of
+each; the antennas' vertical field stays vertical at the target; chains of two targets of which the
+earlier is curved.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+from simulator.antennas.beam_culling import LEVEL, Sight, in_reach
+from simulator.geometry.facets import Facets
+from simulator.geometry.mirrors import Mirrors
+from simulator.geometry.patches import cut_into_patches, patch_side
+from simulator.geometry.ray_scene import CLEARANCE, blocked
+from simulator.materials.reflection_coefficients import reflection_nodes
+from simulator.multibounce.diffuse_echo_3d import diffuse_echo
+from simulator.scattering.patch_kernel import Links
+from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, Seen, scattered_by_patches
+from simulator.scene.radio_scene import RadioScene
+from simulator.scene.scene_mirrors import SceneMirrors
+from simulator.specular.free_space import direct_wave
+from simulator.specular.image_method import trace_chain, unfolded_chain
+from simulator.specular.image_sources import DIRECT, Leg, LegReflection
+from simulator.specular.path_field import reflected_field
+
+NUDGE = np.array([2e-5, 1.4e-5, 0.9e-5])
+"""How far a receiver is moved either way to see whether its path meets an edge: farther than
+rays are lifted off their mirrors, and along no edge of a usual room. [m]"""
+
+
+def echo_over_mirrors(
+    scene: RadioScene, send: Sight, receive: Sight
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the echoes over two and more surfaces, up to the scenario's ``max_bounces``.
+
+    Coherent and diffuse: see :func:`coherent_echo` and
+    :mod:`simulator.multibounce.diffuse_echo_3d`.
+    """
+    return np.asarray(coherent_echo(scene, send, receive) + diffuse_echo(scene, send, receive))
+
+
+def coherent_echo(
+    scene: RadioScene, send: Sight, receive: Sight
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the coherent part of the echoes over two and more surfaces.
+
+    Parameters
+    ----------
+    scene
+        The frozen scene.
+    send, receive
+        The array's antennas, pairwise; the same object if each hears its own echo.
+
+    Returns
+    -------
+    S-parameter at each antenna. [-]
+    """
+    frequencies = scene.scenario.radio.frequencies
+    echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
+    most = scene.scenario.max_bounces - 1
+    among = scene.mirrors
+    if most < 1 or among is None:
+        return echo
+    order = {name: index for index, name in enumerate(scene.scattering)}
+    names = [name for name in among.targets if name in order]
+    for name in names:
+        facets = scene.facets_of(name)
+        own = among.of(name)
+        legs = [DIRECT, *(leg for leg in among.legs if not own.intersection(leg.sequence))]
+        target = _Target(scene, among.mirrors, facets, send, receive)
+        for out, back in product(range(len(legs)), repeat=2):
+            pair = legs[out], legs[back]
+            if not 1 <= pair[0].bounces + pair[1].bounces <= most:
+                continue
+            if send is receive and out > back:  # the same way the other way round
+                continue
+            # Met at the other end of the chain, too: cut there, if that target is the later one.
+            ends = [leg.sequence[0] for leg in pair if leg.sequence]
+            other = among.owners[ends[0]]
+            if len(ends) == 1 and own and other in names and order[other] > order[name]:
+                continue
+            twice = 2.0 if send is receive and out != back else 1.0
+            echo += twice * target.echo(*pair)
+    return np.asarray(echo + _over_mirrors_alone(scene, among, send, receive))
+
+
+@dataclass(frozen=True)
+class _Target:
+    scene: RadioScene
+    mirrors: Mirrors
+    facets: Facets  # its own
+    send: Sight
+    receive: Sight
+
+    def echo(self, out: Leg, back: Leg) -> Complex[np.ndarray, "links freqs"]:
+        """Sum what the target scatters from one leg into another."""
+        scene, facets = self.scene, self.facets
+        frequencies = scene.scenario.radio.frequencies
+        links_count = len(self.receive.positions)
+        nothing = np.zeros((links_count, frequencies.size), dtype=np.complex128)
+        sent = out.image(self.send)
+        same = self.send is self.receive and out is back
+        heard = sent if same else back.image(self.receive)
+        chosen = in_reach([(sent, heard)], facets.centres, 0.0)
+        if not chosen.any():
+            return nothing
+        patches = cut_into_patches(
+            facets,
+            np.flatnonzero(chosen),
+            patch_side(facets, float(frequencies[-1] - frequencies[0])),
+        )
+        seen = self._seen(out, self.send, patches.order, patches.first)
+        if not same:
+            seen = seen & self._seen(back, self.receive, patches.order, patches.first)
+        if not seen.any():
+            return nothing
+        patch_of = np.full(facets.count, -1)
+        patch_of[patches.order] = np.repeat(np.arange(patches.count), np.diff(patches.first))
+        mirrors = [*out.sequence, *back.sequence]
+        start, stop = float(frequencies[0]), float(frequencies[-1])
+        nodes = 3  # the loss of roughness
+        for mirror in mirrors:
+            material = self.mirrors.materials[mirror]
+            nodes += reflection_nodes(material, start, stop, accuracy=COEFFICIENT_ACCURACY) - 1
+        places = sent.positions
+        links = Links(
+            senders=places,
+            receivers=places if same else heard.positions,
+            sent=sent.pattern,
+            received=sent.pattern if same else heard.pattern,
+        )
+        spectrum: np.ndarray = scattered_by_patches(
+            facets,
+            links,
+            partial(_look_up, seen, patch_of),
+            frequencies,
+            chosen=chosen,
+            factor=LegReflection(mirrors=self.mirrors, out=out, back=back),
+            factor_nodes=nodes,
+        )
+        return spectrum
+
+    def _seen(
+        self,
+        leg: Leg,
+        sight: Sight,
+        order: Int[np.ndarray, " facets"],
+        first: Int[np.ndarray, " patches_and_one"],
+    ) -> Bool[np.ndarray, "links patches"]:
+        """Trace one facet of each patch over a leg, from every antenna: what faces them most."""
+        facets = self.facets.part(order)
+        towards = leg.image(sight).centre - facets.centres
+        facing = np.abs(np.einsum("fx,fx->f", towards, facets.normals))
+        front = facets.two_sided | (np.einsum("fx,fx->f", towards, facets.normals) > 0)
+        facing = np.where(front, facing, -1.0)
+        most = np.repeat(np.maximum.reduceat(facing, first[:-1]), np.diff(first))
+        candidates = np.flatnonzero(facing == most)
+        patch_of = np.repeat(np.arange(len(first) - 1), np.diff(first))[candidates]
+        best = candidates[np.unique(patch_of, return_index=True)[1]]
+        chain = trace_chain(
+            self.mirrors,
+            leg.sequence,
+            sight.positions,
+            facets.centres[best],
+            blocked=partial(blocked, self.scene.rays),
+            receiver_offsets=CLEARANCE * facets.normals[best],
+        )
+        return chain.valid
+
+
+def _look_up(
+    seen: Bool[np.ndarray, "links patches"],
+    patch_of: Int[np.ndarray, " facets"],
+    some: Int[np.ndarray, " some"],
+) -> Seen:
+    """Tell what is seen of some facets from what is seen of their patches."""
+    always, ever = np.asarray(seen.all(axis=0)), np.asarray(seen.any(axis=0))
+    patches = patch_of[some]
+    mixed = np.flatnonzero((ever & ~always)[patches])
+    return Seen(
+        always=always[patches],
+        sometimes=mixed,
+        table=np.ascontiguousarray(seen[:, patches[mixed]].T),
+    )
+
+
+def _over_mirrors_alone(
+    scene: RadioScene, among: SceneMirrors, send: Sight, receive: Sight
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the chains that return to the array over two and more mirrors, and no target."""
+    frequencies = scene.scenario.radio.frequencies
+    echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
+    mirrors = among.mirrors
+    for leg in among.chains:
+        if leg.bounces < 2 or any(among.owners[mirror] in among.targets for mirror in leg.sequence):
+            continue
+        image = leg.image(send)
+        towards = receive.positions - image.positions
+        lengths = np.sqrt(np.einsum("lx,lx->l", towards, towards))
+        directions = towards / lengths[:, None]
+        gains = image.pattern.towards(directions) * receive.pattern.towards(-directions)
+        peak = send.pattern.peak * receive.pattern.peak
+        if gains.max(initial=0.0) < LEVEL * peak:
+            continue
+        some = np.flatnonzero(gains >= LEVEL * peak)
+        shares = _shares(scene, mirrors, leg, send.positions[some], receive.positions[some])
+        some, shares = some[shares > 0.0], shares[shares > 0.0]
+        if some.size == 0:
+            continue
+        chain = unfolded_chain(
+            mirrors, leg.sequence, image.positions[some], receive.positions[some], paired=True
+        )
+        field = reflected_field(mirrors, chain, frequencies)
+        wave = direct_wave(lengths[some], frequencies, waves="spherical")
+        echo[some] += (shares * gains[some])[:, None] * field * wave
+    return echo
+
+
+def _shares(
+    scene: RadioScene,
+    mirrors: Mirrors,
+    leg: Leg,
+    sources: Float[np.ndarray, "links 3"],
+    receivers: Float[np.ndarray, "links 3"],
+) -> Float[np.ndarray, " links"]:
+    """Tell which paths a leg has, 0 or 1; where it just has one, one half.
+
+    Between two walls at right angles the way back to the antenna meets their very edge. Both
+    orders of the walls then count half, as physical optics has it: half of the Fresnel zone lies
+    on either wall.
+    """
+    found = [
+        np.diagonal(
+            trace_chain(
+                mirrors,
+                leg.sequence,
+                sources,
+                receivers + side * NUDGE,
+                blocked=partial(blocked, scene.rays),
+                paired=True,
+            ).valid
+        )
+        for side in (1.0, -1.0)
+    ]
+    shares: np.ndarray = np.mean(found, axis=0)
+    return shares

@@ -1,0 +1,95 @@
+r"""What ideal points scatter: the radar equation, each leg tested for occlusion.
+
+.. math:: S = \frac{\lambda \sqrt{\sigma}}{(4\pi)^{3/2} R_t R_r} g_t g_r e^{-jk(R_t + R_r)}
+
+Points see neither each other nor the mirrors: only the direct ways count.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+
+from scenes.scenario import User
+from scenes.schema.antenna import Antenna
+from simulator.antennas.field_pattern import field_gain
+from simulator.geometry.ray_scene import blocked
+from simulator.scene.radio_scene import RadioScene
+
+
+class _Leg(NamedTuple):
+    gains: Float[np.ndarray, " places"]  # of the antenna, 0 where the point is hidden [-]
+    distances: Float[np.ndarray, " places"]  # [m]
+
+
+def point_echo(scene: RadioScene) -> Complex[np.ndarray, "positions freqs"]:
+    """Simulate the echo of a scenario's points, each position on its own.
+
+    Returns
+    -------
+    S-parameter at each position of the array. [-]
+    """
+    total = _nothing(scene)
+    for target in scene.scenario.points.values():
+        back = _array_leg(scene, target.position)
+        outward, station = back, scene.scenario.base_station
+        places = station.transmit_positions(scene.elements)
+        if places is not None:
+            aims = scene.scenario.transmit_aims(places)
+            outward = _leg(scene, station.transmit_antenna, places, aims, target.position)
+        total += _link(scene, outward, back, target.rcs_m2)
+    return total
+
+
+def point_uplink(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
+    """Simulate what a scenario's points scatter of a user's pilot.
+
+    Returns
+    -------
+    S-parameter at each element. [-]
+    """
+    total = _nothing(scene)
+    for target in scene.scenario.points.values():
+        place = user.position[None]
+        aims = scene.scenario.aim(user.antenna, user.position)[None]
+        outward = _leg(scene, user.antenna, place, aims, target.position)
+        total += _link(scene, outward, _array_leg(scene, target.position), target.rcs_m2)
+    return total
+
+
+def _nothing(scene: RadioScene) -> Complex[np.ndarray, "elements freqs"]:
+    shape = (len(scene.elements), scene.scenario.radio.points)
+    return np.zeros(shape, dtype=np.complex128)
+
+
+def _array_leg(scene: RadioScene, point: Float[np.ndarray, " 3"]) -> _Leg:
+    aims = scene.scenario.element_aims(scene.elements)
+    return _leg(scene, scene.scenario.base_station.antenna, scene.elements, aims, point)
+
+
+def _leg(
+    scene: RadioScene,
+    antenna: Antenna,
+    places: Float[np.ndarray, "places 3"],
+    aims: Float[np.ndarray, "places 3"],
+    point: Float[np.ndarray, " 3"],
+) -> _Leg:
+    towards = point - places
+    distances = np.linalg.norm(towards, axis=-1)
+    gains = field_gain(antenna, aims, towards / distances[:, None])
+    hidden = blocked(scene.rays, places, np.broadcast_to(point, places.shape))
+    return _Leg(np.where(hidden, 0.0, gains), distances)
+
+
+def _link(
+    scene: RadioScene, outward: _Leg, back: _Leg, cross_section: float
+) -> Complex[np.ndarray, "elements freqs"]:
+    frequencies = scene.scenario.radio.frequencies
+    wavelengths = speed_of_light / frequencies
+    spread = outward.gains * back.gains / (outward.distances * back.distances)
+    amplitude = wavelengths * np.sqrt(cross_section) / (4 * np.pi) ** 1.5
+    turns = (outward.distances + back.distances)[:, None] / wavelengths
+    phase = np.exp(-2j * np.pi * np.remainder(turns, 1.0))
+    link: np.ndarray = spread[:, None] * amplitude * phase
+    return link

@@ -1,0 +1,151 @@
+"""A user's pilot at the array: the line of sight, and what the facets scatter of it."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from jaxtyping import Complex
+
+from scenes.scenario import User
+from simulator.antennas.beam_culling import Sight
+from simulator.antennas.field_pattern import field_gain
+from simulator.geometry.ray_scene import blocked
+from simulator.multibounce.diffuse_field_3d import diffuse_wave
+from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
+from simulator.response.single_bounce_3d import scattered_in_space
+from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scene.array_antennas import array_sight, in_space, user_sight
+from simulator.scene.radio_scene import RadioScene, facet_ports
+from simulator.specular.diffuse_chains import diffuse_legs
+from simulator.specular.free_space import direct_wave
+from simulator.specular.image_method import trace_chain
+from simulator.specular.path_field import specular_response
+from simulator.visibility.line_of_sight import in_line_of_sight
+
+
+def simulate_uplink(
+    scene: RadioScene,
+    user: User,
+    array: Ports | None,
+    *,
+    advance: Callable[[], None],
+    over_several: SeveralProgress = untold,
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Simulate one user's noise-free pilot: direct, over one bounce and over more.
+
+    Over a single rough mirror the facets give the coherent and the diffuse part at once, so
+    that no specular leg is added to them.
+
+    Parameters
+    ----------
+    scene
+        The frozen scene.
+    user
+        Transmits.
+    array
+        Ports of the array; ``None`` if nothing scatters.
+    advance
+        Called for each element that is done.
+    over_several
+        Told how much is done of what comes over several surfaces.
+
+    Returns
+    -------
+    S-parameter at each element (cylindrical waves: field). [-]
+    """
+    pilot: np.ndarray = _direct(scene, user)
+    if in_space(scene.scenario):
+        name = next(name for name, one in scene.scenario.users.items() if one is user)
+        sender, array_there = (
+            user_sight(scene.scenario, name),
+            array_sight(scene.scenario, scene.elements),
+        )
+        over_one = scattered_in_space(scene, sender, array_there, advance=advance)
+        over_more_there = _over_mirrors(scene, sender, array_there)
+        over_more_there += _diffuse_over_mirrors(scene, sender, array_there)
+        return np.asarray(pilot + over_one + over_more_there)
+    if array is None or scene.facets is None:
+        return pilot
+    port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])
+    over_walls: np.ndarray = scattered(
+        scene.facets,
+        port,
+        array,
+        scene.scenario.radio.frequencies,
+        waves=scene.scenario.waves,
+        advance=advance,
+    )
+    both: np.ndarray = pilot + over_walls
+    if not scene.facets.flat:
+        return both
+    over_more: np.ndarray = uplink_over_surfaces(
+        scene.mutual_visibility.faces,
+        scene.mutual_visibility,
+        port,
+        array,
+        scene.scenario.radio.frequencies,
+        waves=scene.scenario.waves,
+        max_bounces=scene.scenario.max_bounces,
+        progress=over_several,
+    )
+    return np.asarray(both + over_more)
+
+
+def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
+    scenario, station = scene.scenario, scene.scenario.base_station
+    elements = scene.elements
+    towards = elements - user.position
+    distances = np.linalg.norm(towards, axis=-1)
+    directions = towards / distances[:, None]
+    gains = field_gain(user.antenna, scenario.aim(user.antenna, user.position), directions)
+    gains = gains * field_gain(
+        station.antenna, scenario.aim(station.antenna, elements.mean(axis=0)), -directions
+    )
+    seen = in_line_of_sight(scene.rays, user.position, elements)
+    wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)
+    return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)
+
+
+def _over_mirrors(
+    scene: RadioScene, sender: Sight, array: Sight
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Sum the specular paths over two and more mirrors, in space."""
+    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
+    if scene.mirrors is None or most < 2:
+        return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    # From the user the mirrors of a leg of the array are met in turn; other chains are out of
+    # the reach of the array's pattern, whatever the user's.
+    chains = (
+        trace_chain(
+            scene.mirrors.mirrors,
+            leg.sequence[::-1],
+            sender.positions,
+            array.positions,
+            blocked=partial(blocked, scene.rays),
+        )
+        for leg in scene.mirrors.chains
+        if 2 <= leg.bounces <= most
+    )
+    response: np.ndarray = specular_response(
+        scene.mirrors.mirrors,
+        chains,
+        frequencies,
+        (1, len(array.positions)),
+        transmit=sender.pattern.towards,
+        receive=array.pattern.towards,
+    )
+    return np.asarray(response[0])
+
+
+def _diffuse_over_mirrors(
+    scene: RadioScene, sender: Sight, array: Sight
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Sum what any one rough mirror of two and more scatters diffusely, in space."""
+    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
+    response = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    if scene.mirrors is None or most < 2:
+        return response
+    chains = [leg for leg in scene.mirrors.chains if 2 <= leg.bounces <= most]
+    for chain in diffuse_legs(scene.mirrors.mirrors, chains):
+        response += diffuse_wave(scene, chain, array, sender)
+    return response

@@ -1,0 +1,240 @@
+"""Links over millions of triangles: their geometry in one kernel, their sum on the CPU's cores.
+
+The same physical optics as :mod:`simulator.scattering.physical_optics` does in NumPy, in the same
+order: distances and phases in double precision, amplitudes in single. What a facet reflects must
+not vary over the band (conductors; echoes, which share one coefficient).
+"""
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.compute import engine
+from simulator.geometry.facets import Facets
+from simulator.numerics.nufft_sum import FrequencySum
+
+mi.set_variant(engine.mitsuba_variant())
+
+SERIES_DEGREE = 16
+"""As in :data:`simulator.scattering.physical_optics.SERIES_DEGREE`."""
+
+WAITING = 2
+"""Links whose facets are ready before a core is free to sum them: each takes 40 byte a facet."""
+
+Pair = tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]
+"""Where a link's transmitter and receiver stand. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """What is multiplied to the facets' scattering in one link."""
+
+    lit: Bool[np.ndarray, " facets"]  # seen from both ends
+    gain: Float[np.ndarray, " facets"] | None = None  # product of both patterns; None: 1
+
+
+class FacetKernel:
+    """Facets as the kernel reads them."""
+
+    def __init__(self, facets: Facets) -> None:
+        self.count = facets.count
+        self.centres = [mi.Float64(np.ascontiguousarray(axis)) for axis in facets.centres.T]
+        self.normals = _single(facets.normals)
+        self.sizes = mi.Float(facets.sizes.astype(np.float32))
+        self.edges = [_single(facets.edges[:, side]) for side in range(2)]
+        self.two_sided = mi.Bool(facets.two_sided)
+
+    def typical_advance(self, pairs: list[Pair]) -> float:
+        """Difference of delay over one facet, the largest of these links. [s].
+
+        Over a link's facets it is the root of the mean sixth power: what three nodes leave of
+        a facet goes with the third power, and adds up in power.
+        """
+        largest = 0.0
+        for transmit, receive in pairs:
+            legs = [self._leg(end) for end in (transmit, receive)]
+            both = legs[0].direction + legs[1].direction
+            first, second = (dr.dot(both, edge) for edge in self.edges)
+            slope = dr.maximum(dr.maximum(abs(first), abs(second)), abs(first - second))
+            slope *= 1.0 / speed_of_light
+            scale = float(dr.max(slope)[0])
+            if scale > 0.0:  # in single precision the sixth power would vanish
+                share = float(dr.mean((slope * (1.0 / scale)) ** 6)[0])
+                largest = max(largest, scale * share ** (1 / 6))
+        return largest
+
+    def link(
+        self, pair: Pair, weights: Weights, total: FrequencySum, *, monostatic: bool
+    ) -> tuple[Float[np.ndarray, " facets"], list[Float[np.ndarray, " facets"]]]:
+        """Evaluate one link's facets: phases per frequency step, and terms at the nodes.
+
+        Of each term the real part, then the imaginary part.
+
+        For a conductor, or, for an echo, a surface that turns the field round.
+        """
+        inward = self._leg(pair[0])
+        outward = inward if monostatic else self._leg(pair[1])
+        length = inward.distance + outward.distance
+        turns = length * dr.opaque(mi.Float64, total.centre / speed_of_light)
+        steps = length * dr.opaque(mi.Float64, total.step / speed_of_light)
+        sine, cosine = dr.sincos(mi.Float(turns - dr.round(turns)) * (-2 * math.pi))
+        # In double: it is multiplied by hundreds of steps.
+        phases = (steps - dr.round(steps)) * (2 * math.pi)
+        same_side = inward.cosine * outward.cosine > 0
+        lit = mi.Bool(weights.lit) & same_side & (self.two_sided | (inward.cosine > 0))
+        product = mi.Float(inward.distance) * mi.Float(outward.distance)
+        amplitude = abs(inward.cosine + outward.cosine) * self.sizes / (8 * math.pi * product)
+        if monostatic:
+            amplitude = -amplitude
+        else:
+            amplitude *= _turned(inward.exact, outward.exact)
+        if weights.gain is not None:
+            amplitude *= mi.Float(weights.gain.astype(np.float32))
+        amplitude = dr.select(lit, amplitude, 0.0)
+        both = inward.direction + outward.direction
+        first, second = (dr.dot(both, edge) / speed_of_light for edge in self.edges)
+        terms = []
+        for node in total.nodes:
+            wave = dr.opaque(mi.Float, 2 * math.pi * float(node))
+            re, im = triangle_transform(wave * first, wave * second)
+            terms += [
+                amplitude * (re * cosine - im * sine),
+                amplitude * (re * sine + im * cosine),
+            ]
+        dr.eval(phases, *terms)  # together: one kernel
+        return phases.numpy(), [term.numpy() for term in terms]
+
+    def _leg(self, end: Float[np.ndarray, " 3"]) -> "_Leg":
+        # Opaque: the same kernel serves all links.
+        towards = [
+            dr.opaque(mi.Float64, float(place)) - axis
+            for place, axis in zip(end, self.centres, strict=True)
+        ]
+        distance = dr.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+        exact = mi.Vector3d(*(axis / distance for axis in towards))
+        direction = mi.Vector3f(exact)
+        return _Leg(distance, exact, direction, dr.dot(direction, self.normals))
+
+
+@dataclass(frozen=True)
+class _Leg:
+    distance: Any
+    exact: Any
+    direction: Any
+    cosine: Any
+
+
+def sum_links(
+    kernel: FacetKernel,
+    pairs: list[Pair],
+    weights: Callable[[int], Weights],
+    total: FrequencySum,
+    *,
+    monostatic: bool,
+    advance: Callable[[], None] = lambda: None,
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the facets of each link: one kernel after the other, while other cores sum.
+
+    Parameters
+    ----------
+    kernel
+        The facets.
+    pairs
+        Transmitter and receiver of each link.
+    weights
+        What each link's facets are weighted by.
+    total
+        The sum over the band.
+    monostatic
+        Whether each pair is one place.
+    advance
+        Called once for each link that is done.
+
+    Returns
+    -------
+    The sums, of a conductor's facets; :math:`j` times them is the S-parameter. [-]
+    """
+    workers = max(1, min(engine.thread_count(), os.cpu_count() or 1))
+    rows: list[Complex[np.ndarray, " freqs"]] = []
+    waiting: list[Future[Complex[np.ndarray, " freqs"]]] = []
+
+    def finished(most: int) -> Iterator[Complex[np.ndarray, " freqs"]]:
+        while len(waiting) > most:
+            yield waiting.pop(0).result()
+            advance()
+
+    with ThreadPoolExecutor(workers) as pool:
+        for index, pair in enumerate(pairs):
+            phases, terms = kernel.link(pair, weights(index), total, monostatic=monostatic)
+            waiting.append(pool.submit(_sum, total, phases, terms))
+            rows += finished(workers + WAITING)
+        rows += finished(0)
+    return np.stack(rows)
+
+
+def _sum(
+    total: FrequencySum,
+    phases: Float[np.ndarray, " facets"],
+    parts: list[Float[np.ndarray, " facets"]],
+) -> Complex[np.ndarray, " freqs"]:
+    terms = np.empty((total.nodes.size, phases.size), dtype=np.complex128)
+    for row in range(total.nodes.size):
+        terms[row].real, terms[row].imag = parts[2 * row], parts[2 * row + 1]
+    return total.transform(phases, terms)
+
+
+def _single(vectors: Float[np.ndarray, "facets 3"]) -> Any:
+    return mi.Vector3f(*(mi.Float(axis.astype(np.float32)) for axis in vectors.T))
+
+
+def _turned(transmit: Any, receive: Any) -> Any:
+    """Reflect between vertical antennas. [-].
+
+    See :mod:`simulator.materials.reflection_coefficients`.
+    """
+    along = dr.dot(transmit, receive)
+    turn = 1.0 - along * along
+    across = receive.x * transmit.y - receive.y * transmit.x
+    upright = dr.sqrt(
+        dr.maximum(1.0 - transmit.z * transmit.z, 0.0)
+        * dr.maximum(1.0 - receive.z * receive.z, 0.0)
+    )
+    te = across * across
+    tm = (receive.z - transmit.z * along) * (transmit.z - receive.z * along)
+    scale = turn * upright
+    split = dr.select(scale > 0.0, (tm - te) / scale, 0.0)
+    one_way = dr.select(upright > 0.0, mi.Float64(-1.0), mi.Float64(0.0))
+    return mi.Float(dr.select(turn <= 1e-10, one_way, split))
+
+
+def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
+    """Average a linear phase over triangles; see physical_optics.facet_transform. [-]."""
+    mean = (first + second) * (1.0 / 3.0)
+    a, b, c = -mean, first - mean, second - mean
+    pairs = a * b + b * c + c * a
+    product = a * b * c
+    polynomials = [mi.Float(1.0), mi.Float(0.0), -pairs]
+    re, im = mi.Float(1.0), mi.Float(0.0)
+    for degree in range(2, SERIES_DEGREE + 1):
+        if degree > 2:
+            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
+        part = polynomials[degree] * (2.0 / math.factorial(degree + 2))
+        match degree % 4:
+            case 0:
+                re += part
+            case 1:
+                im += part
+            case 2:
+                re -= part
+            case 3:
+                im -= part
+    return re, im

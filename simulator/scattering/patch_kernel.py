@@ -1,0 +1,366 @@
+r"""The sum over each patch of triangles, at a few frequencies and between given places: one kernel.
+
+The same physical optics as :mod:`simulator.scattering.physical_optics`, relative to the patch's
+centre: with the centre at :math:`\mathbf a` before an antenna and a triangle
+:math:`\boldsymbol\rho` off it,
+
+.. math:: |\mathbf a - \boldsymbol\rho| - |\mathbf a| =
+          \frac{\rho^2 - 2\,\mathbf a \cdot \boldsymbol\rho}
+          {|\mathbf a - \boldsymbol\rho| + |\mathbf a|}
+
+which single precision gives to some nanometres. One lane sums one patch for one link, one
+triangle after the other: the result does not depend on the number of threads.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from jaxtyping import Bool, Complex64, Float
+from scipy.constants import speed_of_light
+
+from estimator.compute import engine
+from simulator.antennas.antenna_pattern import AntennaPattern
+from simulator.geometry.patches import Patches
+from simulator.materials.layered_media import Conductor, Material, reflection
+from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
+
+mi.set_variant(engine.mitsuba_variant())
+
+SERIES_DEGREE = 12
+"""Terms of a triangle's transform: corner phases stay below π, and π¹³·2/15! is 4e-6."""
+
+SHAPE_NODES = 3
+"""Frequencies at which a triangle's transform is worked out; in between it is a parabola. [-]"""
+
+ANGLES = 2048
+"""Cosines of incidence at which a dielectric's coefficients are tabulated. [-]"""
+
+ONE_WAY = 1e-9
+"""Squared sine between the legs below which they are one, in single precision. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Links:
+    """Places between which waves travel, pairwise; echoes if both are the same object."""
+
+    senders: Float[np.ndarray, "links 3"]  # [m]
+    receivers: Float[np.ndarray, "links 3"]  # [m]
+    sent: AntennaPattern
+    received: AntennaPattern
+
+    @property
+    def echo(self) -> bool:
+        """Whether each wave returns to where it came from."""
+        return self.receivers is self.senders and self.received is self.sent
+
+
+class PatchKernel:
+    """Patches as the kernel reads them."""
+
+    def __init__(
+        self, patches: Patches, material: Material, nodes: Float[np.ndarray, " nodes"]
+    ) -> None:
+        self.patches, self.material, self.nodes = patches, material, nodes
+        self.first = mi.UInt32(patches.first.astype(np.uint32))
+        self.values = mi.Float(
+            np.concatenate([patches.offsets, patches.edges.reshape(-1, 6)], axis=-1).ravel()
+        )
+        self.one_sided = mi.Bool(patches.one_sided)
+        self.all_two_sided = not patches.one_sided.any()
+        self.centres = [mi.Float64(np.ascontiguousarray(axis)) for axis in patches.centres.T]
+        few = chebyshev_nodes(float(nodes.min()), float(nodes.max()), SHAPE_NODES)
+        if nodes.size < SHAPE_NODES or nodes.max() == nodes.min():
+            few = nodes[:1] if nodes.max() == nodes.min() else nodes
+        self.few, self.basis = few, lagrange_basis(few, nodes)
+        self.table: Any = None
+
+    def __call__(
+        self, links: Links, mask: Bool[np.ndarray, "facets links"] | None = None
+    ) -> Complex64[np.ndarray, "patches links nodes"]:
+        """Sum each patch for each link, relative to the delay of its centre.
+
+        Times :math:`j` it is the S-parameter; for echoes of a dielectric its reflection
+        coefficient at normal incidence is left out, and a conductor's is in.
+
+        Parameters
+        ----------
+        links
+            The links.
+        mask
+            Which triangles each link sees, in the patches' order; without, all.
+        """
+        count, patches = len(links.receivers), self.patches.count
+        lane = dr.arange(mi.UInt32, count * patches)
+        patch = lane // count
+        link = lane - patch * count
+        centre = [dr.gather(mi.Float64, axis, patch) for axis in self.centres]
+        inward = _End(links.senders, links.sent, link, centre)
+        outward = inward if links.echo else _End(links.receivers, links.received, link, centre)
+        reflector = self._reflector(inward, outward, echo=links.echo)
+        seen = None if mask is None else mi.Bool(np.ascontiguousarray(mask).ravel())
+        start = dr.gather(mi.UInt32, self.first, patch)
+        stop = dr.gather(mi.UInt32, self.first, patch + 1)
+        size = self.nodes.size
+
+        def body(index: Any, *sums: Any) -> tuple[Any, ...]:
+            at = index * 9
+            offset, one, other = (
+                mi.Vector3f(*(dr.gather(mi.Float, self.values, at + k + axis) for axis in range(3)))
+                for k in (0, 3, 6)
+            )
+            across = 0.5 * dr.cross(one, other)
+            first = inward.leg(offset)
+            second = first if links.echo else outward.leg(offset)
+            here, there = dr.dot(first.direction, across), dr.dot(second.direction, across)
+            lit = here * there > 0
+            if not self.all_two_sided:
+                lit &= (here > 0) | ~dr.gather(mi.Bool, self.one_sided, index)
+            if seen is not None:
+                lit &= dr.gather(mi.Bool, seen, index * count + link)
+            amplitude = abs(here + there) / (8 * math.pi * first.distance * second.distance)
+            amplitude *= inward.gain(first.direction)
+            amplitude *= outward.gain(second.direction)
+            both = first.direction + second.direction
+            amplitude = dr.select(lit, amplitude, 0.0)
+            shapes = self._shapes(dr.dot(both, one), dr.dot(both, other))
+            phasors = self._phasors(first.longer + second.longer)
+            coefficients = reflector(first.direction, second.direction)
+            new = []
+            for node in range(size):
+                re, im = _product(shapes[node], phasors[node])
+                gamma = coefficients if isinstance(coefficients, _Real) else coefficients[node]
+                if isinstance(gamma, _Real):
+                    re, im = re * gamma.value, im * gamma.value
+                else:
+                    re, im = _product((re, im), gamma)
+                new += [sums[2 * node] + amplitude * re, sums[2 * node + 1] + amplitude * im]
+            return index + 1, *new
+
+        zeros = [dr.zeros(mi.Float, count * patches) for _ in range(2 * size)]
+        loop: Any = dr.while_loop
+        state = loop(
+            state=(start, *zeros),
+            cond=lambda index, *sums: index < stop,
+            body=body,
+            compress=False,
+        )
+        dr.eval(*state[1:])
+        result = np.empty((patches, count, size), dtype=np.complex64)
+        for node in range(size):
+            re, im = state[1 + 2 * node].numpy(), state[2 + 2 * node].numpy()
+            result[..., node].real = re.reshape(patches, count)
+            result[..., node].imag = im.reshape(patches, count)
+        return result
+
+    def _shapes(self, first: Any, second: Any) -> list[Any]:
+        """Transform of a triangle at all nodes, by way of a few."""
+        exact = []
+        for node in self.few:
+            wave = dr.opaque(mi.Float, 2 * math.pi * float(node) / speed_of_light)
+            exact.append(triangle_transform(wave * first, wave * second))
+        if self.few is self.nodes:
+            return exact
+        shapes = []
+        for node in range(self.nodes.size):
+            weights = [dr.opaque(mi.Float, float(w)) for w in self.basis[:, node]]
+            shapes.append(
+                tuple(
+                    sum(w * part[k] for w, part in zip(weights, exact, strict=True)) for k in (0, 1)
+                )
+            )
+        return shapes
+
+    def _phasors(self, longer: Any) -> list[Any]:
+        """Turn by the difference of length to the patch's centre, at all nodes.
+
+        Chebyshev nodes lie in pairs about their middle.
+        """
+        middle = 0.5 * (self.nodes[0] + self.nodes[-1])
+        scale = 2 * math.pi / speed_of_light
+        carrier = _turned(longer * dr.opaque(mi.Float, scale * float(middle)))
+        size = self.nodes.size
+        phasors: list[Any] = [carrier] * size
+        for node in range(size // 2):
+            apart = 0.5 * float(self.nodes[size - 1 - node] - self.nodes[node])
+            re, im = _turned(longer * dr.opaque(mi.Float, scale * apart))
+            phasors[size - 1 - node] = _product(carrier, (re, im))
+            phasors[node] = _product(carrier, (re, -im))
+        return phasors
+
+    def _reflector(self, inward: "_End", outward: "_End", *, echo: bool) -> Any:
+        """Return what gives the coefficients of a triangle from both directions."""
+        if echo:
+            constant = _Real(mi.Float(-1.0 if isinstance(self.material, Conductor) else 1.0))
+            return lambda first, second: constant
+        if isinstance(self.material, Conductor):
+
+            def conductor(first: Any, second: Any) -> _Real:
+                te, tm = _shares(first, second)
+                return _Real(tm - te)
+
+            return conductor
+        middle = mi.Float(_half_angle_cosine(inward.towards_centre(), outward.towards_centre()))
+        te_and_tm = self._tabulated(middle)
+
+        def dielectric(first: Any, second: Any) -> list[Any]:
+            shares = _shares(first, second)
+            apart = _half_angle_cosine(first, second) - middle
+            gammas = []
+            for node in range(self.nodes.size):
+                parts = [0.0, 0.0]
+                for share, table in zip(shares, te_and_tm, strict=True):
+                    for k in (0, 1):
+                        value, slope = table[node][k]
+                        parts[k] += share * (value + slope * apart)
+                gammas.append(tuple(parts))
+            return gammas
+
+        return dielectric
+
+    def _tabulated(self, cosine: Any) -> list[list[tuple[Any, Any]]]:
+        """Look up the coefficients at a cosine, and their slopes, by cubic interpolation."""
+        if self.table is None:
+            cosines = np.linspace(0.0, 1.0, ANGLES + 1)
+            values = reflection(self.material, self.nodes, cosines)
+            self.table = [
+                [
+                    [mi.Float(np.ascontiguousarray(part).astype(np.float32)) for part in pair]
+                    for pair in ((v.real, v.imag) for v in np.ascontiguousarray(kind.T))
+                ]
+                for kind in values
+            ]
+        place = cosine * ANGLES
+        below = dr.clip(mi.UInt32(place), 1, ANGLES - 2)
+        share = place - mi.Float(below)
+        found = []
+        for kind in self.table:
+            rows = []
+            for pair in kind:
+                row = []
+                for part in pair:
+                    a, b, c, d = (dr.gather(mi.Float, part, below - 1 + k) for k in range(4))
+                    m0, m1 = 0.5 * (c - a), 0.5 * (d - b)
+                    p2, p3 = 3 * (c - b) - 2 * m0 - m1, 2 * (b - c) + m0 + m1
+                    value = b + share * (m0 + share * (p2 + share * p3))
+                    slope = (m0 + share * (2 * p2 + 3 * share * p3)) * ANGLES
+                    row.append((value, slope))
+                rows.append((row[0], row[1]))
+            found.append(rows)
+        return found
+
+
+@dataclass(frozen=True)
+class _Real:
+    value: Any
+
+
+@dataclass(frozen=True)
+class _Leg:
+    direction: Any  # from the triangle to the antenna
+    distance: Any
+    longer: Any  # than from the patch's centre
+
+
+class _End:
+    """One end of the links, relative to the patches' centres."""
+
+    def __init__(
+        self, places: Float[np.ndarray, "links 3"], pattern: AntennaPattern, link: Any, centre: Any
+    ) -> None:
+        axes = [mi.Float64(np.ascontiguousarray(axis)) for axis in places.T]
+        apart = [
+            dr.gather(mi.Float64, axis, link) - c for axis, c in zip(axes, centre, strict=True)
+        ]
+        distance = dr.sqrt(apart[0] ** 2 + apart[1] ** 2 + apart[2] ** 2)
+        self.apart: Any
+        self.distance: Any
+        self.apart, self.distance = mi.Vector3f(*(mi.Float(a) for a in apart)), mi.Float(distance)
+        self.pattern = pattern
+        self.aim = mi.Vector3f(*(dr.opaque(mi.Float, float(a)) for a in pattern.aim))
+        self.peak = dr.opaque(mi.Float, pattern.peak)
+
+    def towards_centre(self) -> Any:
+        return self.apart / self.distance
+
+    def leg(self, offset: Any) -> _Leg:
+        towards = self.apart - offset
+        distance = dr.norm(towards)
+        longer = (dr.dot(offset, offset) - 2 * dr.dot(self.apart, offset)) / (
+            distance + self.distance
+        )
+        return _Leg(towards / distance, distance, longer)
+
+    def gain(self, direction: Any) -> Any:
+        """Field pattern towards a triangle that sees the antenna in that direction."""
+        pattern = self.pattern
+        if math.isfinite(pattern.width):
+            apart = direction + self.aim
+            half = dr.minimum(0.5 * dr.norm(apart), 1.0)
+            angle = 2 * dr.asin(half)
+            return self.peak * dr.exp(angle * angle * dr.opaque(mi.Float, -0.5 / pattern.width**2))
+        if pattern.forward_only:
+            cosine = -dr.dot(direction, self.aim)
+            power = dr.opaque(mi.Float, pattern.power)
+            front = dr.exp(power * dr.log(dr.maximum(cosine, 1e-30)))
+            return dr.select(cosine > 0, self.peak * front, 0.0)
+        return mi.Float(1.0)
+
+
+def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
+    """Average a linear phase over triangles; see physical_optics.facet_transform. [-]."""
+    mean = (first + second) * (1.0 / 3.0)
+    a, b, c = -mean, first - mean, second - mean
+    pairs = a * b + b * c + c * a
+    product = a * b * c
+    polynomials = [mi.Float(1.0), mi.Float(0.0), -pairs]
+    re, im = mi.Float(1.0), mi.Float(0.0)
+    for degree in range(2, SERIES_DEGREE + 1):
+        if degree > 2:
+            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
+        part = polynomials[degree] * (2.0 / math.factorial(degree + 2))
+        match degree % 4:
+            case 0:
+                re = re + part
+            case 1:
+                im = im + part
+            case 2:
+                re = re - part
+            case 3:
+                im = im - part
+    return re, im
+
+
+def _turned(phase: Any) -> tuple[Any, Any]:
+    sine, cosine = dr.sincos(phase)
+    return cosine, -sine
+
+
+def _product(one: Any, other: Any) -> tuple[Any, Any]:
+    return one[0] * other[0] - one[1] * other[1], one[0] * other[1] + one[1] * other[0]
+
+
+def _half_angle_cosine(first: Any, second: Any) -> Any:
+    return dr.minimum(0.5 * dr.norm(first + second), 1.0)
+
+
+def _shares(first: Any, second: Any) -> tuple[Any, Any]:
+    """TE and TM share of a link of vertical antennas.
+
+    See :mod:`simulator.materials.reflection_coefficients`.
+    """
+    across = dr.cross(first, second)
+    turn = dr.squared_norm(across)
+    upright = dr.sqrt(
+        dr.maximum(1.0 - first.z * first.z, 0.0) * dr.maximum(1.0 - second.z * second.z, 0.0)
+    )
+    one_way = turn < ONE_WAY
+    unit = across / dr.sqrt(dr.maximum(turn, ONE_WAY))
+    scale = dr.select(upright > 0.0, 1.0 / dr.maximum(upright, 1e-12), 0.0)
+    te = unit.z * unit.z * scale
+    tm = -dr.cross(first, unit).z * dr.cross(second, unit).z * scale
+    straight = dr.select(upright > 0.0, mi.Float(1.0), mi.Float(0.0))
+    return dr.select(one_way, straight, te), dr.select(one_way, 0.0, tm)

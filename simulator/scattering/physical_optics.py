@@ -1,0 +1,350 @@
+r"""Physical optics on frozen facets, in the reciprocal form, for two and three dimensions.
+
+Between two antenna ports, a facet of size :math:`\Delta A` with reflection coefficient
+:math:`\Gamma` contributes
+
+.. math:: S = \frac{jk}{\lambda} \Gamma\, (\cos\theta_t + \cos\theta_r)\, h_t h_r\, \Delta A
+          \operatorname{sinc}(k\,(\hat u_t + \hat u_r)\cdot e / 2)
+
+with the free-space links :math:`h = g\lambda/(4\pi r)\,e^{-jkr}` of both legs, antenna
+patterns :math:`g`, and the facet's edge :math:`e`; :math:`\Gamma` is that of
+:mod:`simulator.materials.reflection_coefficients`. The usual :math:`2\cos\theta_i` is not
+reciprocal. For line facets, the integral along z is done by stationary phase, which gives
+the spherical wave of a scene that is invariant along z; the cylindrical wave is that of a
+unit line source :math:`G = -\tfrac{j}{4} H_0^{(2)}(kr)`, for comparison with
+two-dimensional full-wave solvers.
+"""
+
+import math
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.compute.engine import thread_count
+from estimator.measurement.model import Waves
+from simulator.geometry.facets import Facets
+from simulator.materials.layered_media import Absorber, Conductor, Material
+from simulator.materials.reflection_coefficients import (
+    angle_class,
+    echo_coefficient,
+    facet_coefficients,
+    half_angle_cosine,
+    reflection_nodes,
+)
+from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
+
+SERIES_DEGREE = 16
+"""Terms of a triangle's transform: corner phases stay below π, and π¹⁷·2/19! is 5e-9."""
+
+SAMPLES_AT_ONCE = 4_000_000
+"""Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
+
+FEWEST_FOR_KERNEL = 200_000
+"""Triangles times links from which the kernel is worth compiling, a third of a second. [-]"""
+
+TRIANGLE_ACCURACY = 8e-4
+"""Error of interpolating a triangle's farthest corner over the band. The average over a
+triangle takes at most an eighth of that to second order, a fortieth to third: the moments of
+its points about the centroid. [-]"""
+
+MOST_TRIED, MARGIN = 16, 1.1
+"""Links of which the facets' slopes are looked at, and what the others may exceed them by."""
+
+Pattern = Callable[
+    [Float[np.ndarray, "facets 3"], Float[np.ndarray, " facets"], Float[np.ndarray, " nodes"]],
+    Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"],
+]
+"""Field over that of an isotropic port, from the unit directions that leave the port, the
+distances [m] and the frequencies [Hz]; a single row if it does not vary with frequency."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ports:
+    """Antenna ports at points of space, as the facets see them."""
+
+    positions: Float[np.ndarray, "ports 3"]  # [m]
+    pattern: Pattern
+    visible: Bool[np.ndarray, "ports facets"]
+    nodes: int = 1  # frequencies that the pattern has to be sampled at
+
+
+def scattered(
+    facets: Facets,
+    transmit: Ports,
+    receive: Ports,
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    waves: Waves,
+    advance: Callable[[], None] = lambda: None,
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the facets' echoes for each link from a transmitting to a receiving port.
+
+    Parameters
+    ----------
+    facets
+        The frozen surface.
+    transmit, receive
+        Ports of the links, pairwise; a single transmitter serves all receivers. If both are
+        the same object, the links are monostatic.
+    frequencies
+        Uniform grid. [Hz]
+    waves
+        Spherical (S-parameters) or cylindrical (fields of a unit line source).
+    advance
+        Called once for each link that is done.
+
+    Returns
+    -------
+    S-parameter of each link; with cylindrical waves, field per unit line source. [-]
+    """
+    monostatic = receive is transmit
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    count = nodes_needed(2 * facets.extent / speed_of_light, stop - start)
+    count += transmit.nodes + receive.nodes - 2  # degrees of a product add up
+    parts = [
+        _Part(material, mask, count, frequencies, monostatic=monostatic)
+        for material, mask in facets.by_material
+        if not isinstance(material, Absorber)
+    ]
+    if _suits_the_kernel(facets, transmit, receive, parts):
+        return _by_kernel(facets, transmit, receive, parts, frequencies, advance)
+    shared = _Leg(facets, transmit, 0) if len(transmit.positions) == 1 else None
+
+    def link(index: int) -> Complex[np.ndarray, " freqs"]:
+        inward = shared or _Leg(facets, transmit, index)
+        outward = inward if monostatic else _Leg(facets, receive, index)
+        # Both ends must see the same side of the facet.
+        lit = inward.lit & outward.lit & (inward.cosine * outward.cosine > 0)
+        spectrum = np.zeros(frequencies.size, dtype=np.complex128)
+        for part in parts:
+            chosen = lit if part.mask is None else lit & part.mask
+            spectrum += _partial_link(facets, chosen, inward, outward, part, waves)
+        advance()
+        return spectrum
+
+    # Threads change nothing in the result: each link is summed by one of them.
+    with ThreadPoolExecutor(thread_count()) as pool:
+        return np.stack(list(pool.map(link, range(len(receive.positions)))))
+
+
+def _suits_the_kernel(
+    facets: Facets, transmit: Ports, receive: Ports, parts: "list[_Part]"
+) -> bool:
+    """Tell whether these are many triangles that reflect alike over the band."""
+    many = not facets.flat and facets.count * len(receive.positions) >= FEWEST_FOR_KERNEL
+    alike = all(part.monostatic or isinstance(part.material, Conductor) for part in parts)
+    return many and alike and transmit.nodes == receive.nodes == 1
+
+
+def _by_kernel(
+    facets: Facets,
+    transmit: Ports,
+    receive: Ports,
+    parts: "list[_Part]",
+    frequencies: Float[np.ndarray, " freqs"],
+    advance: Callable[[], None],
+) -> Complex[np.ndarray, "links freqs"]:
+    from simulator.scattering.facet_kernel import FacetKernel, Weights, sum_links
+
+    monostatic, count = receive is transmit, len(receive.positions)
+    senders = np.zeros(count, dtype=int) if len(transmit.positions) == 1 else np.arange(count)
+    pairs = [
+        (transmit.positions[sender], receive.positions[index])
+        for index, sender in enumerate(senders)
+    ]
+    kernel = FacetKernel(facets)
+    some = np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(int))
+    spread = MARGIN * kernel.typical_advance([pairs[index] for index in some])
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    nodes = chebyshev_nodes(
+        start, stop, nodes_needed(spread, stop - start, accuracy=TRIANGLE_ACCURACY)
+    )
+    total = FrequencySum(frequencies, nodes)
+
+    def gain(ports: Ports, index: int) -> Float[np.ndarray, " facets"] | None:
+        if ports.pattern is isotropic:
+            return None
+        return np.asarray(_Leg(facets, ports, index).gain(np.arange(facets.count), nodes)[0].real)
+
+    spectrum = np.zeros((count, frequencies.size), dtype=np.complex128)
+    for part in parts:
+
+        def weights(index: int, part: _Part = part) -> Weights:
+            sender = int(senders[index])
+            lit = transmit.visible[sender]
+            lit = lit if monostatic else lit & receive.visible[index]
+            lit = lit if part.mask is None else lit & part.mask
+            one = gain(transmit, sender)
+            other = one if monostatic else gain(receive, index)
+            both = other if one is None else one if other is None else one * other
+            return Weights(lit=lit, gain=both)
+
+        def told(part: _Part = part) -> None:
+            if part is parts[-1]:
+                advance()
+
+        sums = sum_links(kernel, pairs, weights, total, monostatic=monostatic, advance=told)
+        # The kernel turns the field round; what is common to all facets does so itself.
+        spectrum += sums if part.common is None else -part.common * sums
+    return 1j * spectrum
+
+
+def isotropic(
+    directions: Float[np.ndarray, "facets 3"],
+    distances: Float[np.ndarray, " facets"],
+    frequencies: Float[np.ndarray, " nodes"],
+) -> Float[np.ndarray, "1 facets"]:
+    """Pattern of an isotropic port."""
+    return np.ones((1, len(distances)))
+
+
+class _Part:
+    """The facets of one material: how their sum over the band is sampled."""
+
+    def __init__(
+        self,
+        material: Material,
+        mask: Bool[np.ndarray, " facets"] | None,
+        count: int,
+        frequencies: Float[np.ndarray, " freqs"],
+        *,
+        monostatic: bool,
+    ) -> None:
+        self.material, self.mask, self.count = material, mask, count
+        self.frequencies, self.monostatic = frequencies, monostatic
+        # Towards where it came from, all facets reflect alike: the sum is multiplied once.
+        self.common: Complex[np.ndarray, " freqs"] | None = None
+        if monostatic and not isinstance(material, Conductor):
+            self.common = echo_coefficient(material, frequencies)
+        self._totals: dict[float, FrequencySum] = {}
+        self._lock = threading.Lock()
+
+    def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
+        """Return the sum that samples the band as finely as these facets' angles need it."""
+        same = self.monostatic or isinstance(self.material, Conductor)
+        legs = inward.direction[lit], outward.direction[lit]
+        lowest = 1.0 if same else angle_class(half_angle_cosine(*legs))
+        with self._lock:
+            if lowest not in self._totals:
+                start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
+                count = self.count
+                if not same:
+                    count += reflection_nodes(self.material, start, stop, lowest=lowest) - 1
+                nodes = chebyshev_nodes(start, stop, count)
+                self._totals[lowest] = FrequencySum(self.frequencies, nodes)
+            return self._totals[lowest]
+
+    def coefficients(
+        self,
+        inward: "_Leg",
+        outward: "_Leg",
+        some: np.ndarray,
+        nodes: Float[np.ndarray, " nodes"],
+        *,
+        flat: bool,
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        """Reflect at the nodes; what is common to all facets is left out."""
+        if self.monostatic:
+            return np.full((1, len(some)), -1.0 if self.common is None else 1.0)
+        legs = inward.direction[some], outward.direction[some]
+        return facet_coefficients(self.material, *legs, nodes, flat=flat)
+
+
+class _Leg:
+    """Distances and directions from one port to all facets."""
+
+    def __init__(self, facets: Facets, ports: Ports, index: int) -> None:
+        towards = ports.positions[index] - facets.centres
+        self.distance = np.sqrt(np.einsum("fx,fx->f", towards, towards))
+        self.direction = towards / self.distance[:, None]
+        self.cosine = np.einsum("fx,fx->f", self.direction, facets.normals)
+        self.lit = ports.visible[index] & (facets.two_sided | (self.cosine > 0))
+        self.pattern = ports.pattern
+        self._gains: dict[int, np.ndarray] = {}
+
+    def gain(
+        self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        """Field pattern of the port towards some of the facets."""
+        if nodes.size not in self._gains:  # all parts' nodes span the same band
+            self._gains[nodes.size] = self.pattern(-self.direction, self.distance, nodes)
+        return self._gains[nodes.size][:, some]
+
+
+def _partial_link(
+    facets: Facets,
+    chosen: Bool[np.ndarray, " facets"],
+    inward: _Leg,
+    outward: _Leg,
+    part: _Part,
+    waves: Waves,
+) -> Complex[np.ndarray, " freqs"]:
+    lit = np.flatnonzero(chosen)
+    add_up = part.total(inward, outward, lit)
+    nodes = add_up.nodes
+    total = np.zeros(part.frequencies.size, dtype=np.complex128)
+    at_once = max(1, SAMPLES_AT_ONCE // nodes.size)
+    for first in range(0, len(lit), at_once):
+        some = lit[first : first + at_once]
+        lengths = inward.distance[some] + outward.distance[some]
+        product = inward.distance[some] * outward.distance[some]
+        obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
+        amplitude = obliquity * facets.sizes[some] / (8 * np.pi)
+        if not facets.flat:  # (jk/λ)(λ/4π)² = j/(8π)
+            amplitude = amplitude / product
+        elif waves == "spherical":  # √(λ/L) e^{jπ/4} times the cylindrical wave
+            amplitude = amplitude / np.sqrt(product * lengths)
+        else:  # jk G² with |G|² = 1/(8πkr)
+            amplitude = amplitude / np.sqrt(product)
+        gain = inward.gain(some, nodes) * outward.gain(some, nodes)
+        slope = (inward.direction[some] + outward.direction[some])[:, None, :] * facets.edges[some]
+        advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
+        shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
+        shape = shape * part.coefficients(inward, outward, some, nodes, flat=facets.flat)
+        total += add_up(lengths / speed_of_light, amplitude * gain * shape)
+    if part.common is not None:
+        total *= part.common
+    if not facets.flat:
+        return 1j * total
+    if waves == "spherical":
+        total = np.exp(0.25j * np.pi) * np.sqrt(speed_of_light / part.frequencies) * total
+    return total
+
+
+def facet_transform(
+    advances: Float[np.ndarray, "nodes facets sides"],
+) -> Float[np.ndarray, "nodes facets"] | Complex[np.ndarray, "nodes facets"]:
+    r"""Average a linear phase over facets, relative to the phase at their centres.
+
+    A line gives :math:`\operatorname{sinc}(a/2)`. A triangle with corner phases
+    :math:`p_i`, :math:`\sum p_i = 0`, gives :math:`\sum_n \frac{2 j^n}{(n+2)!} h_n(p)` with
+    the complete homogeneous symmetric polynomials :math:`h_n = -e_2 h_{n-2} + e_3 h_{n-3}`;
+    unlike the quotient of exponentials it has no removable poles.
+
+    Parameters
+    ----------
+    advances
+        Phase at the end of each edge, relative to the corner that the edges share. [rad]
+
+    Returns
+    -------
+    The average of the phase factor; 1 for a facet much smaller than the wavelength. [-]
+    """
+    if advances.shape[-1] == 1:
+        return np.asarray(np.sinc(advances[..., 0] / (2 * np.pi)))
+    corners = np.concatenate([np.zeros_like(advances[..., :1]), advances], axis=-1)
+    first, second, third = np.moveaxis(corners - corners.mean(axis=-1, keepdims=True), -1, 0)
+    pairs = first * second + second * third + third * first
+    product = first * second * third
+    polynomials = [np.ones_like(first), np.zeros_like(first), -pairs]
+    transform = polynomials[0] + 0j
+    for degree in range(2, SERIES_DEGREE + 1):
+        if degree > 2:
+            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
+        transform += polynomials[degree] * (2 * 1j**degree / math.factorial(degree + 2))
+    return np.asarray(transform)

@@ -1,0 +1,100 @@
+"""The antennas of a scenario in space, and where facets are needed because they look there."""
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import product
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from scenes.scenario import Scenario
+from scenes.schema.antenna import Antenna
+from scenes.surfaces.tiled_faces import Reach
+from simulator.antennas.antenna_pattern import ISOTROPIC, AntennaPattern
+from simulator.antennas.beam_culling import Sight, in_reach
+from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg
+from simulator.specular.image_sources import DIRECT, Leg
+
+
+def in_space(scenario: Scenario) -> bool:
+    """Tell whether a scenario is three-dimensional and heard by an array of parallel antennas."""
+    return scenario.dimensions == 3 and not scenario.base_station.multistatic
+
+
+def array_sight(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> Sight:
+    """Return the array's antennas, which look in parallel."""
+    return _sight(scenario, scenario.base_station.antenna, elements)
+
+
+def sending_sight(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> Sight | None:
+    """Return the antennas that transmit the array's echo; None: the elements themselves."""
+    offset = scenario.base_station.transmit_offset
+    if offset is None:
+        return None
+    return _sight(scenario, scenario.base_station.antenna, elements + offset)
+
+
+def user_sight(scenario: Scenario, name: str) -> Sight:
+    """Return a user's antenna."""
+    user = scenario.users[name]
+    return _sight(scenario, user.antenna, user.position[None])
+
+
+def needed_reach(
+    scenario: Scenario,
+    elements: Float[np.ndarray, "elements 3"],
+    legs: Sequence[Leg],
+    rough: Sequence[DiffuseLeg] = (),
+) -> Reach:
+    """Tell where facets of an object are needed.
+
+    Parameters
+    ----------
+    scenario
+        Its base station and its users.
+    elements
+        Where the array's antennas truly stand. [m]
+    legs
+        Ways over mirrors on which the object is seen, too.
+    rough
+        Ways over several mirrors, of which the object is the one that scatters diffusely.
+    """
+    array = array_sight(scenario, elements)
+    send = sending_sight(scenario, elements) or array
+    most = scenario.max_bounces - 1
+    pairs = [
+        (out.image(send), back.image(array))
+        for out, back in product((DIRECT, *legs), repeat=2)
+        if out.bounces + back.bounces <= most
+    ]
+    users = [user_sight(scenario, name) for name in scenario.users]
+    pairs += [(user, array) for user in users]
+    over_several = []
+    for chain in rough:
+        ends = {id(sight): chain.before.image(sight) for sight in (send, array)}
+        if chain.bounces <= most and chain.before.bounces:  # to a target, in any direction
+            over_several += [(end, _anywhere(end)) for end in ends.values()]
+        if chain.bounces >= 2:
+            over_several += [(chain.after.image(user), ends[id(array)]) for user in users]
+    return partial(_either, pairs, over_several)
+
+
+def _anywhere(sight: Sight) -> Sight:
+    return Sight(positions=sight.positions[:1], pattern=ISOTROPIC)
+
+
+def _either(
+    pairs: Sequence[tuple[Sight, Sight]],
+    diffuse: Sequence[tuple[Sight, Sight]],
+    centres: Float[np.ndarray, "spheres 3"],
+    radius: float,
+) -> Bool[np.ndarray, " spheres"]:
+    reached: np.ndarray = in_reach(pairs, centres, radius)
+    left = np.flatnonzero(~reached)
+    reached[left] = in_reach(diffuse, centres[left], radius, level=DIFFUSE_LEVEL)
+    return reached
+
+
+def _sight(scenario: Scenario, antenna: Antenna, positions: Float[np.ndarray, "n 3"]) -> Sight:
+    aim = scenario.aim(antenna, positions.mean(axis=0))
+    return Sight(positions=positions, pattern=AntennaPattern(antenna, aim))

@@ -1,0 +1,203 @@
+"""The specular paths of a scenario: from the array to each user, and to each hidden target."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from scenes.realisations.object_surface import Surface
+from scenes.scenario import Scenario
+from scenes.schema.antenna import Antenna
+from scenes.schema.objects import Plate
+from simulator.antennas.field_pattern import field_gain
+from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
+from simulator.geometry.mirrors import Mirrors
+from simulator.geometry.ray_scene import blocked, build_scene
+from simulator.materials.layered_media import Absorber
+from simulator.scene.radio_scene import scenario_materials
+from simulator.specular.image_method import Blocked, Chain, find_chains
+
+PLACES = 17
+"""Places on each line of a target from which paths to the array are sought."""
+
+MOST_PER_TARGET = 3
+"""Chains of mirrors shown for one target, the shortest ones."""
+
+_ON_SURFACE = 2e-6  # how far off its surface a target's place is tested for occlusion [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioPath:
+    """One specular path from the centre of the array."""
+
+    end: str  # name of the user or object at its end
+    kind: Literal["user", "object", "receiver"]
+    vertices: Float[np.ndarray, "vertices 3"]  # from the array onward [m]
+    gain_db: float  # of both antennas in its direction, relative to their peaks [dB]
+
+    @property
+    def bounces(self) -> int:
+        """Number of mirrors on the way."""
+        return len(self.vertices) - 2
+
+    @property
+    def length(self) -> float:
+        """Length of the way [m]."""
+        return float(np.linalg.norm(np.diff(self.vertices, axis=0), axis=-1).sum())
+
+
+def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
+    """Find the specular paths over the smooth mean surfaces, each segment tested for occlusion.
+
+    Parameters
+    ----------
+    scenario
+        Its plates, boxes and meshes of few faces are mirrors, unless they absorb.
+
+    Returns
+    -------
+    First the users' paths, then those to the nearest place of each object that is no plate;
+    by number of bounces. Where antennas stand by themselves, the path from the first transmitter
+    over each mirror to the receiver that hears it best.
+
+    Raises
+    ------
+    ScenarioError
+        If a material is not known over the band.
+    """
+    surfaces = mean_surfaces(scenario)
+    materials = scenario_materials(scenario)
+    scene = build_scene(surfaces)
+    mirrors = mean_mirrors(scenario, surfaces, materials)
+
+    def meets(
+        starts: Float[np.ndarray, "rays 3"], ends: Float[np.ndarray, "rays 3"]
+    ) -> Bool[np.ndarray, " rays"]:
+        return blocked(scene, starts, ends)
+
+    if scenario.base_station.multistatic:
+        return tuple(_to_receivers(scenario, mirrors, meets))
+    found = [*_to_users(scenario, mirrors, meets)]
+    for surface in surfaces:
+        body = scenario.objects[surface.name]
+        if not isinstance(body, Plate) and not isinstance(materials[surface.name], Absorber):
+            found += _to_object(scenario, surface, mirrors, meets)
+    del scene
+    return tuple(found)
+
+
+def _to_users(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
+    centre = _centre(scenario)
+    for name, user in scenario.users.items():
+        chains = find_chains(
+            mirrors,
+            centre[None],
+            user.position[None],
+            blocked=meets,
+            max_bounces=scenario.max_bounces,
+        )
+        for chain in chains:
+            gain = _gain_db(scenario, scenario.base_station.antenna, centre, chain.departures[0])
+            gain += _gain_db(scenario, user.antenna, user.position, chain.arrivals[0])
+            yield ScenarioPath(
+                end=name,
+                kind="user",
+                vertices=np.stack([centre, *chain.vertices[0], user.position]),
+                gain_db=gain,
+            )
+
+
+def _to_receivers(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
+    station = scenario.base_station
+    places = station.element_positions
+    senders = station.transmit_positions(places)
+    sender = places[0] if senders is None else senders[0]
+    chains = find_chains(mirrors, sender[None], places, blocked=meets, max_bounces=1)
+    for chain in chains:
+        valid = np.flatnonzero(chain.valid[0])
+        if len(chain.vertices[0]) == 0:
+            continue  # from horn to horn: no part of the echo
+        gains = [
+            _gain_db(scenario, station.transmit_antenna, sender, departure)
+            + _gain_db(scenario, station.antenna, places[index], arrival)
+            for index, departure, arrival in zip(
+                valid, chain.departures, chain.arrivals, strict=True
+            )
+        ]
+        best = int(np.argmax(gains))
+        yield ScenarioPath(
+            end=f"receiver {valid[best]}",
+            kind="receiver",
+            vertices=np.stack([sender, *chain.vertices[best], places[valid[best]]]),
+            gain_db=gains[best],
+        )
+
+
+def _to_object(
+    scenario: Scenario, surface: Surface, mirrors: Mirrors, meets: Blocked
+) -> list[ScenarioPath]:
+    centre = _centre(scenario)
+    places, outward = _places(surface)
+    chains = find_chains(
+        mirrors,
+        centre[None],
+        places,
+        blocked=meets,
+        max_bounces=scenario.max_bounces,
+        receiver_offsets=_ON_SURFACE * outward,
+    )
+    shortest = []
+    for chain in chains:
+        seen = _lit(chain, outward)
+        if seen.any():
+            best = int(np.flatnonzero(seen)[np.argmin(chain.lengths[seen])])
+            place = places[np.flatnonzero(chain.valid[0])[best]]
+            vertices = np.stack([centre, *chain.vertices[best], place])
+            gain = _gain_db(scenario, scenario.base_station.antenna, centre, chain.departures[best])
+            shortest.append(
+                ScenarioPath(end=surface.name, kind="object", vertices=vertices, gain_db=gain)
+            )
+    shortest.sort(key=lambda path: path.length)
+    return sorted(shortest[:MOST_PER_TARGET], key=lambda path: (path.bounces, path.length))
+
+
+def _lit(chain: Chain, outward: Float[np.ndarray, "places 3"]) -> Bool[np.ndarray, " paths"]:
+    """Tell which paths arrive at the outer side of the surface."""
+    normals = outward[np.flatnonzero(chain.valid[0])]
+    lit: np.ndarray = np.einsum("px,px->p", chain.arrivals, normals) > 0
+    return lit
+
+
+def _places(
+    surface: Surface,
+) -> tuple[Float[np.ndarray, "places 3"], Float[np.ndarray, "places 3"]]:
+    """Spread places over a surface's cells, with the cells' outward normals."""
+    points = surface.vertices[surface.cells]
+    share = (np.arange(PLACES) + 0.5) / PLACES
+    if surface.cells.shape[1] == 2:
+        along = points[:, 1] - points[:, 0]
+        outward = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
+        places = points[:, :1] + share[:, None] * along[:, None]
+    else:
+        outward = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+        places = points.mean(axis=1, keepdims=True)
+    outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
+    per_cell = places.shape[1]
+    return places.reshape(-1, 3), np.repeat(outward, per_cell, axis=0)
+
+
+def _centre(scenario: Scenario) -> Float[np.ndarray, " 3"]:
+    return scenario.base_station.centre
+
+
+def _gain_db(
+    scenario: Scenario,
+    antenna: Antenna,
+    place: Float[np.ndarray, " 3"],
+    direction: Float[np.ndarray, " 3"],
+) -> float:
+    aim = scenario.aim(antenna, place)
+    here, peak = field_gain(antenna, aim, np.stack([direction, aim]))
+    return float(20 * np.log10(max(here / peak, 1e-15)))

@@ -1,0 +1,85 @@
+"""The mirrors of a scene in space, whose they are, and the ways over them that antennas reach."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes.scenario import Scenario
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from simulator.antennas.beam_culling import Sight
+from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
+from simulator.geometry.mirrors import Mirrors
+from simulator.materials.layered_media import Material
+from simulator.specular.image_sources import Leg, legs_within_reach
+
+LARGEST_TARGET = 0.5
+"""Longest side of a body that is cut into facets where it is seen over mirrors; larger ones are
+mirrors themselves. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneMirrors:
+    """Mirrors, and the legs over them."""
+
+    mirrors: Mirrors
+    owners: tuple[str, ...]  # the object that each mirror is a face of
+    legs: tuple[Leg, ...]  # that leave a mirror to be spent on a target
+    chains: tuple[Leg, ...]  # as long as may be
+    targets: tuple[str, ...]  # objects that are seen over legs
+
+    def of(self, name: str) -> frozenset[int]:
+        """Mirrors that are faces of an object."""
+        return frozenset(index for index, owner in enumerate(self.owners) if owner == name)
+
+
+def scene_mirrors(
+    scenario: Scenario, materials: Mapping[str, Material], sights: tuple[Sight, ...]
+) -> SceneMirrors:
+    """Find a scenario's mirrors, and the legs over them.
+
+    Parameters
+    ----------
+    scenario, materials
+        What there is.
+    sights
+        The array's antennas.
+    """
+    parts = {
+        surface.name: mean_mirrors(scenario, [surface], dict(materials))
+        for surface in mean_surfaces(scenario)
+    }
+    mirrors = Mirrors(
+        corners=np.concatenate([np.empty((0, 4, 3)), *(part.corners for part in parts.values())]),
+        materials=tuple(material for part in parts.values() for material in part.materials),
+        rms_heights=np.concatenate([np.empty(0), *(part.rms_heights for part in parts.values())]),
+        two_sided=np.concatenate(
+            [np.empty(0, dtype=bool), *(part.two_sided for part in parts.values())]
+        ),
+    )
+    chains: tuple[Leg, ...] = ()
+    if scenario.max_bounces > 1:
+        chains = legs_within_reach(mirrors, sights, scenario.max_bounces)
+    return SceneMirrors(
+        mirrors=mirrors,
+        owners=tuple(name for name, part in parts.items() for _ in range(len(part))),
+        legs=tuple(leg for leg in chains if leg.bounces < scenario.max_bounces),
+        chains=chains,
+        targets=tuple(n for n in scenario.objects if _size(scenario, n) <= LARGEST_TARGET),
+    )
+
+
+def _size(scenario: Scenario, name: str) -> float:
+    body = scenario.objects[name]
+    match body:
+        case Plate():
+            return float("inf")
+        case Cylinder():
+            return max(2 * body.radius_m, body.height_m or float("inf"))
+        case Box():
+            return max(body.length_m, body.depth_m, body.height_m or float("inf"))
+        case MeshFile():
+            from scenes.meshes.mesh_file import placed_mesh
+
+            bounds = np.asarray(placed_mesh(body).bounds)
+            return float((bounds[1] - bounds[0]).max())

@@ -1,0 +1,49 @@
+"""Legs over mirrors of which one is rough and scatters diffusely; where its facets are needed."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from simulator.antennas.beam_culling import Sight
+from simulator.geometry.mirrors import Mirrors
+from simulator.specular.image_method import within_reach
+from simulator.specular.image_sources import DIRECT, Leg
+
+DIFFUSE_LEVEL = 0.1
+"""Product of two field patterns, over that of their peaks, that is left out: of the diffuse power
+that a Gaussian beam throws at a wall, one per cent. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiffuseLeg:
+    """A leg from the array; its rough mirror, and the mirrors on either side of that."""
+
+    leg: Leg  # as it would be specularly
+    rough: int
+    before: Leg  # from the array to the rough mirror
+    after: Leg  # from the other end to the rough mirror
+
+    @property
+    def bounces(self) -> int:
+        """Number of mirrors."""
+        return self.leg.bounces
+
+
+def diffuse_legs(mirrors: Mirrors, legs: Sequence[Leg]) -> Iterator[DiffuseLeg]:
+    """Choose any one rough mirror of each leg."""
+    for leg in legs:
+        for place, mirror in enumerate(leg.sequence):
+            if mirrors.rms_heights[mirror] > 0:
+                yield DiffuseLeg(
+                    leg=leg,
+                    rough=mirror,
+                    before=DIRECT.onward(mirrors, *leg.sequence[:place]),
+                    after=DIRECT.onward(mirrors, *leg.sequence[:place:-1]),
+                )
+
+
+def may_reach(mirrors: Mirrors, chain: DiffuseLeg, array: Sight) -> bool:
+    """Tell whether rays over the mirrors before it may meet the rough one at all."""
+    if not chain.before.sequence:
+        return True
+    images = chain.before.image(array).outline
+    return bool(within_reach(mirrors, chain.before.sequence, images)[chain.rough])

@@ -1,0 +1,133 @@
+r"""Legs of an echo over mirrors: an antenna's image in them illuminates a target.
+
+By the method of images, what an antenna sends over a sequence of plane mirrors arrives as if it
+came from its image, times the mirrors' reflection and the loss of their roughness. So the facets
+of a target seen over walls are summed like those in plain sight, from the images' places; finite
+mirrors and whatever stands in the way cut out parts of it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from simulator.antennas.antenna_pattern import AntennaPattern
+from simulator.antennas.beam_culling import LEVEL, Sight
+from simulator.geometry.mirrors import Mirrors
+from simulator.scattering.patch_kernel import Links
+from simulator.specular.image_method import unfolded_chain
+from simulator.specular.path_field import reflected_field
+
+PAIRS_AT_ONCE = 100_000
+"""Links times patches whose reflection is worked out in one go. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leg:
+    """A way over mirrors; without any it is the direct one."""
+
+    sequence: tuple[int, ...]  # mirrors from the antenna onward
+    turn: Float[np.ndarray, "3 3"]  # of directions
+    shift: Float[np.ndarray, " 3"]  # [m]
+
+    @property
+    def bounces(self) -> int:
+        """Number of mirrors."""
+        return len(self.sequence)
+
+    def image(self, sight: Sight) -> Sight:
+        """Mirror antennas, with the direction in which they look."""
+        if not self.sequence:
+            return sight
+        pattern = AntennaPattern(
+            sight.pattern.antenna, np.einsum("xy,y->x", self.turn, sight.pattern.aim)
+        )
+        places = np.einsum("xy,ny->nx", self.turn, sight.positions) + self.shift
+        return Sight(positions=places, pattern=pattern)
+
+    def onward(self, mirrors: Mirrors, *sequence: int) -> "Leg":
+        """Go on over more mirrors."""
+        leg = self
+        for mirror in sequence:
+            normal = mirrors.normals[mirror]
+            turn = np.eye(3) - 2 * np.outer(normal, normal)
+            base = 2 * float((mirrors.corners[mirror, 0] * normal).sum()) * normal
+            leg = Leg(
+                sequence=(*leg.sequence, mirror),
+                turn=np.einsum("xy,yz->xz", turn, leg.turn),
+                shift=np.einsum("xy,y->x", turn, leg.shift) + base,
+            )
+        return leg
+
+
+DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
+"""The leg without mirrors."""
+
+
+def legs_within_reach(mirrors: Mirrors, sights: Sequence[Sight], most: int) -> tuple[Leg, ...]:
+    """Find the legs of one to so many mirrors that antennas' patterns reach.
+
+    Parameters
+    ----------
+    mirrors
+        All there are.
+    sights
+        Antennas; the leg must be in reach of one of them.
+    most
+        Most mirrors of a leg.
+    """
+    centres = mirrors.corners.mean(axis=1)
+    radii = np.linalg.norm(mirrors.corners - centres[:, None], axis=-1).max(axis=1)
+
+    def grown(leg: Leg) -> Iterator[Leg]:
+        if leg.bounces == most:
+            return
+        for mirror in range(len(mirrors)):
+            if leg.sequence and leg.sequence[-1] == mirror:
+                continue
+            images = [leg.image(sight) for sight in sights]
+            bounds = [i.at_most(centres[mirror : mirror + 1], float(radii[mirror])) for i in images]
+            if max(float(bound[0]) for bound in bounds) < LEVEL or not any(
+                _reflects(mirrors, mirror, image) for image in images
+            ):
+                continue
+            longer = leg.onward(mirrors, mirror)
+            yield longer
+            yield from grown(longer)
+
+    return tuple(grown(DIRECT))
+
+
+def _reflects(mirrors: Mirrors, mirror: int, image: Sight) -> bool:
+    """Tell whether an image is on the reflecting side of a mirror."""
+    heights = mirrors.heights(image.positions, mirror)
+    return bool((np.abs(heights) if mirrors.two_sided[mirror] else heights).max() > 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegReflection:
+    """What both legs' mirrors multiply to the sum over a patch, at its centre."""
+
+    mirrors: Mirrors
+    out: Leg
+    back: Leg
+
+    def __call__(
+        self,
+        links: Links,
+        centres: Float[np.ndarray, "patches 3"],
+        nodes: Float[np.ndarray, " nodes"],
+    ) -> Complex[np.ndarray, "patches links nodes"]:
+        """Work it out for links between images."""
+        total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
+        for leg, places in ((self.out, links.senders), (self.back, links.receivers)):
+            at_once = max(1, PAIRS_AT_ONCE // len(centres))
+            for first in range(0, len(places) if leg.sequence else 0, at_once):
+                some = slice(first, first + at_once)
+                chain = unfolded_chain(self.mirrors, leg.sequence, places[some], centres)
+                field = reflected_field(self.mirrors, chain, nodes)
+                total[:, some] *= np.moveaxis(
+                    field.reshape(len(places[some]), len(centres), -1), 0, 1
+                )
+        return total

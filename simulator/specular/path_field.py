@@ -1,0 +1,181 @@
+r"""What travels along specular paths: polarization, reflection, roughness, spreading and delay.
+
+The S-parameter of a path of length :math:`L` between isotropic ports is
+
+.. math:: S(f) = \frac{\lambda}{4 \pi L} \, e^{-j 2 \pi f L / c} \;
+          \hat e_r \cdot \prod_i e^{-2 (k \sigma_i \cos\theta_i)^2} \, \mathsf R_i(f) \; \hat e_t
+
+with the reflection dyads :math:`\mathsf R_i` of the mirrors (TE and TM coefficients of the slab
+at that angle and frequency) and the field's unit vectors :math:`\hat e` at both antennas.
+"""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+
+from estimator.measurement.model import Waves
+from simulator.geometry.mirrors import Mirrors, dot
+from simulator.materials import layered_media
+from simulator.specular.free_space import direct_wave
+from simulator.specular.image_method import Chain
+
+VERTICAL = np.array([0.0, 0.0, 1.0])
+"""The polarization of all antennas unless told otherwise."""
+
+SAMPLES_AT_ONCE = 1_000_000
+"""Paths times frequencies that are evaluated in one go: 16 MB for each complex quantity."""
+
+Gain = Callable[[Float[np.ndarray, "paths 3"]], Float[np.ndarray, " paths"]]
+"""Field pattern of an antenna over unit directions outward from it."""
+
+
+def isotropic(directions: Float[np.ndarray, "paths 3"]) -> Float[np.ndarray, " paths"]:
+    """Field pattern of an isotropic antenna."""
+    return np.ones(len(directions))
+
+
+def reflected_field(
+    mirrors: Mirrors,
+    chain: Chain,
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    polarization: Float[np.ndarray, " 3"] = VERTICAL,
+) -> Complex[np.ndarray, "paths freqs"]:
+    """Field received over the field sent, spreading and delay apart.
+
+    The product of all reflections, with the coherent loss of roughness, between antennas that
+    send and receive the field's part along one axis.
+
+    Parameters
+    ----------
+    mirrors, chain
+        Paths over a sequence of these mirrors.
+    frequencies
+        Any grid. [Hz]
+    polarization
+        Axis of the antennas; across the ray, the field is along its projection.
+    """
+    everything = slice(0, len(chain.lengths))
+    return _field(mirrors, chain, everything, frequencies, polarization)
+
+
+def _field(
+    mirrors: Mirrors,
+    chain: Chain,
+    some: slice,
+    frequencies: Float[np.ndarray, " freqs"],
+    polarization: Float[np.ndarray, " 3"],
+) -> Complex[np.ndarray, "paths freqs"]:
+    directions = chain.directions[some]
+    sent = transverse(directions[:, 0], polarization)
+    received = transverse(directions[:, -1], polarization)
+    if not chain.mirrors:
+        link = dot(sent, received)[:, None] + 0j
+        return np.repeat(link, frequencies.size, axis=1)
+    wavenumbers = 2.0 * np.pi * frequencies / speed_of_light
+    # Two components across the ray; their unit vectors before and after each mirror.
+    vectors, field = [sent, sent], [np.ones((len(sent), 1)), np.zeros((len(sent), 1))]
+    for bounce, mirror in enumerate(chain.mirrors):
+        inward, outward = directions[:, bounce], directions[:, bounce + 1]
+        across = _across(inward, mirrors.normals[mirror])
+        within = np.cross(inward, across)
+        te, tm = _project(field, vectors, across), _project(field, vectors, within)
+        cosines = chain.cosines[some, bounce]
+        coefficients = layered_media.reflection(mirrors.materials[mirror], frequencies, cosines)
+        loss = roughness_loss(wavenumbers * mirrors.rms_heights[mirror] * cosines[:, None])
+        field = [te * coefficients.te * loss, tm * coefficients.tm * loss]
+        vectors = [across, np.cross(outward, across)]
+    return _project(field, vectors, received)
+
+
+def roughness_loss(phase: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    r"""Coherent amplitude off a rough mirror over that off a smooth one, :math:`e^{-2 g^2}`.
+
+    For Gaussian heights, with :math:`g = k \sigma \cos\theta` in radians.
+    """
+    loss: np.ndarray = np.exp(-2.0 * phase**2)
+    return loss
+
+
+def specular_response(
+    mirrors: Mirrors,
+    chains: Iterable[Chain],
+    frequencies: Float[np.ndarray, " freqs"],
+    shape: tuple[int, int],
+    *,
+    transmit: Gain = isotropic,
+    receive: Gain = isotropic,
+    polarization: Float[np.ndarray, " 3"] = VERTICAL,
+    waves: Waves = "spherical",
+) -> Complex[np.ndarray, "sources receivers freqs"]:
+    """Sum the specular paths of each link.
+
+    Parameters
+    ----------
+    mirrors, chains
+        What :func:`simulator.specular.image_method.find_chains` was given and found.
+    frequencies
+        Any grid. [Hz]
+    shape
+        Numbers of sources and of receivers.
+    transmit, receive
+        Field patterns of the sources and of the receivers.
+    polarization
+        Axis of all antennas.
+    waves
+        Spherical (S-parameters), or cylindrical (fields of unit line sources).
+
+    Returns
+    -------
+    S-parameters of all links; zero where no path leads. [-]
+    """
+    response = np.zeros((*shape, frequencies.size), dtype=np.complex128)
+    paths_at_once = max(1, SAMPLES_AT_ONCE // frequencies.size)
+    for chain in chains:
+        gains = transmit(chain.departures) * receive(chain.arrivals)
+        source, receiver = np.nonzero(chain.valid)
+        for first in range(0, len(gains), paths_at_once):
+            some = slice(first, first + paths_at_once)
+            field = _field(mirrors, chain, some, frequencies, polarization)
+            field *= gains[some, None] * direct_wave(chain.lengths[some], frequencies, waves=waves)
+            response[source[some], receiver[some]] += field  # no link twice: one path a chain
+    return response
+
+
+def transverse(
+    directions: Float[np.ndarray, "paths 3"], axis: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "paths 3"]:
+    """Return unit vectors along the part of an axis that is across each direction.
+
+    Along the axis itself there is no such part; the field is then taken to be zero.
+    """
+    part = axis - dot(directions, axis)[:, None] * directions
+    length = np.linalg.norm(part, axis=-1, keepdims=True)
+    unit: np.ndarray = np.divide(part, length, out=np.zeros_like(part), where=length > 1e-9)
+    return unit
+
+
+def _across(
+    inward: Float[np.ndarray, "paths 3"], normal: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "paths 3"]:
+    """Return unit vectors across the plane of incidence; at normal incidence any in the mirror."""
+    across = np.cross(inward, normal)
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    substitute = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    substitute /= np.linalg.norm(substitute)
+    # Below 1e-9 rad the cross product has lost its direction, and none is needed: TE is TM.
+    return np.where(length > 1e-9, across / np.maximum(length, 1e-9), substitute)
+
+
+def _project(
+    field: list[np.ndarray], vectors: list[np.ndarray], onto: Float[np.ndarray, "paths 3"]
+) -> np.ndarray:
+    """Component along a unit vector of a field given by two components."""
+    parts = [
+        component * dot(vector, onto)[:, None]
+        for component, vector in zip(field, vectors, strict=True)
+    ]
+    total: np.ndarray = parts[0] + parts[1]
+    return total

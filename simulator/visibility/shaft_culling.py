@@ -1,0 +1,262 @@
+"""What antennas see of a scene in space: by shafts where nothing stands between, else by rays.
+
+A shaft is the convex hull of all antennas and of a tile of facets (E. A. Haines and J. R. Wallace,
+"Shaft culling for efficient ray-cast radiosity", 1994, doi:10.1007/978-3-642-57963-9_10). Where a
+plane separates it from every other object, and the object's own facets all face the antennas, a
+ray would find nothing: none is traced. A convex surface with heights over it hides a facet only
+where a facet between faces away.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import sionna.rt as rt
+from jaxtyping import Bool, Float, Int
+
+from scenes.scenario import Scenario
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from scenes.surfaces.facet_spacing import FEWEST_ROUND
+from simulator.geometry.facets import Facets
+from simulator.geometry.mean_surfaces import mean_surfaces, rms_height
+from simulator.geometry.patches import cut_into_patches
+from simulator.geometry.ray_scene import facets_visible
+from simulator.scattering.patch_sum import Seen
+
+TILE = 0.05
+"""Side of the tiles that one shaft leads to. [m]"""
+
+MARGIN = 6.0
+"""How far an object may stand out of its mean shape, over the rms of its heights. [-]"""
+
+GAP = 1e-5
+"""Least distance between a shaft and what does not touch it: rounding, and more. [m]"""
+
+RAYS_AT_ONCE = 2**26
+"""Rays of which the answers are kept at one time: 64 MiB. [-]"""
+
+MOST_FACES = 64
+"""Faces of a mesh up to which each is an obstacle of its own; else its bounding box is one. [-]"""
+
+
+Shape = Literal["smooth", "rough plane", "any"]
+"""Smooth and convex: hides none of what faces the antennas; a rough plane: where it is steep."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obstacle:
+    """A convex body that may stand between: the hull of its corners, and its planes' normals."""
+
+    owner: int  # the object it belongs to
+    corners: Float[np.ndarray, "corners 3"]  # [m]
+    axes: Float[np.ndarray, "axes 3"]  # unit vectors: normals of its faces
+    edges: Float[np.ndarray, "edges 3"]  # unit vectors along its edges
+    margin: float  # by how much it may stand out [m]
+
+
+def scenario_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
+    """Take each object of a scenario as one or more convex bodies."""
+    found = []
+    for owner, surface in enumerate(mean_surfaces(scenario)):
+        body = scenario.objects[surface.name]
+        margin = GAP + MARGIN * rms_height(scenario, surface.name)
+        points = surface.vertices
+        if isinstance(body, MeshFile) and len(surface.cells) <= MOST_FACES:
+            for cell in surface.cells:
+                found.append(_triangle(owner, points[cell], margin))
+            continue
+        frame = np.eye(3)
+        if isinstance(body, Plate | Box):
+            frame = np.stack([body.tangent, body.across, [0.0, 0.0, 1.0]])
+        along = np.einsum("px,ax->pa", points, frame)
+        if isinstance(body, Cylinder):  # its lines round are chords
+            margin += body.radius_m * (1 - math.cos(math.pi / FEWEST_ROUND))
+        low, high = along.min(axis=0), along.max(axis=0)
+        mask = np.array(np.meshgrid(*[[0, 1]] * 3, indexing="ij")).reshape(3, -1).T
+        found.append(
+            Obstacle(
+                owner=owner,
+                corners=np.einsum("ca,ax->cx", np.where(mask == 1, high, low), frame),
+                axes=frame,
+                edges=frame,
+                margin=margin,
+            )
+        )
+    return tuple(found)
+
+
+def object_shape(scenario: Scenario, name: str) -> Shape:
+    """Tell how an object may hide parts of itself."""
+    if isinstance(scenario.objects[name], MeshFile):
+        return "any"
+    if rms_height(scenario, name) == 0:
+        return "smooth"
+    return "rough plane" if isinstance(scenario.objects[name], Plate) else "any"
+
+
+def _triangle(owner: int, corners: Float[np.ndarray, "3 3"], margin: float) -> Obstacle:
+    edges = np.roll(corners, -1, axis=0) - corners
+    edges /= np.linalg.norm(edges, axis=-1, keepdims=True)
+    normal = np.cross(edges[0], edges[1])
+    normal /= np.linalg.norm(normal)
+    return Obstacle(
+        owner=owner,
+        corners=corners,
+        axes=np.concatenate([normal[None], np.cross(normal, edges)]),
+        edges=edges,
+        margin=margin,
+    )
+
+
+def clear_shafts(
+    antennas: Float[np.ndarray, "antennas 3"],
+    centres: Float[np.ndarray, "tiles 3"],
+    radii: Float[np.ndarray, " tiles"],
+    obstacles: Sequence[Obstacle],
+) -> Bool[np.ndarray, " tiles"]:
+    """Tell between which tiles and all antennas surely none of the obstacles stands.
+
+    Parameters
+    ----------
+    antennas
+        [m]
+    centres, radii
+        Spheres around the tiles. [m]
+    obstacles
+        What may stand between.
+    """
+    clear = np.ones(len(centres), dtype=bool)
+    middle = antennas.mean(axis=0)
+    along = centres - middle
+    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    box = np.array(np.meshgrid(*zip(antennas.min(axis=0), antennas.max(axis=0), strict=True)))
+    ends = antennas if len(antennas) < 8 else box.reshape(3, -1).T
+    for obstacle in obstacles:
+        left = np.flatnonzero(clear)
+        if left.size == 0:
+            break
+        apart = np.zeros(left.size, dtype=bool)
+        for axis in (*obstacle.axes, *np.eye(3)):
+            apart |= _separated(np.broadcast_to(axis, (left.size, 3)), ends, centres[left],
+                                radii[left], obstacle)  # fmt: skip
+        for edge in (*obstacle.edges, *np.eye(3)):
+            across = np.cross(along[left], edge)
+            length = np.linalg.norm(across, axis=-1, keepdims=True)
+            across = np.divide(across, length, out=np.zeros_like(across), where=length > 1e-6)
+            apart |= _separated(across, ends, centres[left], radii[left], obstacle)
+        clear[left] = apart
+    return clear
+
+
+def _separated(
+    axes: Float[np.ndarray, "tiles 3"],
+    ends: Float[np.ndarray, "ends 3"],
+    centres: Float[np.ndarray, "tiles 3"],
+    radii: Float[np.ndarray, " tiles"],
+    obstacle: Obstacle,
+) -> Bool[np.ndarray, " tiles"]:
+    """Tell for which tiles a plane across an axis lies between the shaft and the obstacle."""
+    here = np.einsum("tx,ex->te", axes, ends)
+    there = np.einsum("tx,tx->t", axes, centres)
+    low = np.minimum(here.min(axis=1), there - radii)
+    high = np.maximum(here.max(axis=1), there + radii)
+    body = np.einsum("tx,cx->tc", axes, obstacle.corners)
+    result: np.ndarray = (body.min(axis=1) - obstacle.margin > high) | (
+        body.max(axis=1) + obstacle.margin < low
+    )
+    return result
+
+
+@dataclass
+class Sightlines:
+    """Tells which facets of a scene are seen over links; called with a block of facets."""
+
+    rays: rt.Scene
+    facets: Facets
+    senders: Float[np.ndarray, "senders 3"]  # as many as receivers, or a single one [m]
+    receivers: Float[np.ndarray, "links 3"]  # [m]
+    obstacles: Sequence[Obstacle]
+    shapes: Sequence[Shape]  # of the object of each material of the facets
+    objects: Sequence[int]  # index of that object
+    traced: int = field(default=0, init=False)  # facets that rays were traced for
+
+    def __call__(self, some: Int[np.ndarray, " some"]) -> Seen:
+        """Look at some facets."""
+        clear = np.zeros(len(some), dtype=bool)
+        owners = (
+            np.zeros(len(some), dtype=np.int64)
+            if self.facets.material is None
+            else self.facets.material[some]
+        )
+        for surface in np.unique(owners).tolist():
+            mine = np.flatnonzero(owners == surface)
+            if self.shapes[surface] != "any":
+                clear[mine[self._clear(some[mine], surface)]] = True
+        return self._trace(some, clear)
+
+    def _clear(self, some: Int[np.ndarray, " some"], surface: int) -> Int[np.ndarray, " clear"]:
+        """Return which of one object's facets surely see all antennas."""
+        tiles = cut_into_patches(self.facets.part(some), np.arange(len(some)), TILE)
+        others = [one for one in self.obstacles if one.owner != self.objects[surface]]
+        clear = np.ones(tiles.count, dtype=bool)
+        normals = self.facets.normals[some][tiles.order]
+        for ends in self._ends():
+            clear &= clear_shafts(ends, tiles.centres, tiles.radii, others)
+            if self.shapes[surface] == "rough plane":
+                clear &= self._all_face(ends, tiles.centres, tiles.radii, tiles.first, normals)
+        kept: np.ndarray = tiles.order[np.repeat(clear, np.diff(tiles.first))]
+        return kept
+
+    def _all_face(
+        self,
+        ends: Float[np.ndarray, "ends 3"],
+        centres: Float[np.ndarray, "tiles 3"],
+        radii: Float[np.ndarray, " tiles"],
+        first: Int[np.ndarray, " tiles_and_one"],
+        normals: Float[np.ndarray, "facets 3"],
+    ) -> Bool[np.ndarray, " tiles"]:
+        """Tell whose facets, and their neighbours as steep as any, all face the antennas."""
+        counts = np.diff(first)
+        mean = np.add.reduceat(normals, first[:-1], axis=0)
+        mean /= np.linalg.norm(mean, axis=-1, keepdims=True)
+        tilt = np.einsum("fx,fx->f", normals, np.repeat(mean, counts, axis=0))
+        steepest = float(np.arccos(np.clip(tilt.min(), -1.0, 1.0)))
+        middle = ends.mean(axis=0)
+        extent = float(np.linalg.norm(ends - middle, axis=-1).max())
+        towards = middle - centres
+        distance = np.linalg.norm(towards, axis=-1)
+        spread = np.minimum((extent + radii) / distance, 1.0)
+        cosine = np.abs(np.einsum("tx,tx->t", towards, mean)) / distance
+        incidence = np.arccos(np.clip(cosine, 0.0, 1.0)) + np.arcsin(spread)
+        faces: np.ndarray = (spread < 1.0) & (incidence + steepest < np.pi / 2)
+        return faces
+
+    def _ends(self) -> list[Float[np.ndarray, "ends 3"]]:
+        same = self.senders is self.receivers
+        return [self.receivers] if same else [self.senders, self.receivers]
+
+    def _trace(self, some: Int[np.ndarray, " some"], clear: Bool[np.ndarray, " some"]) -> Seen:
+        """Trace rays from all antennas to the facets that are not clear."""
+        count = len(self.receivers)
+        always, sometimes, rows = clear.copy(), [], []
+        unclear = np.flatnonzero(~clear)
+        self.traced += unclear.size
+        at_once = max(1, RAYS_AT_ONCE // count)
+        for first in range(0, unclear.size, at_once):
+            here = unclear[first : first + at_once]
+            part = self.facets.part(some[here])
+            seen = np.ones((count, here.size), dtype=bool)
+            for ends in self._ends():
+                seen &= facets_visible(self.rays, part, ends)
+            everywhere, anywhere = seen.all(axis=0), seen.any(axis=0)
+            always[here[everywhere]] = True
+            mixed = anywhere & ~everywhere
+            sometimes.append(here[mixed])
+            rows.append(np.ascontiguousarray(seen[:, mixed].T))
+        return Seen(
+            always=always,
+            sometimes=np.concatenate([np.empty(0, dtype=np.int64), *sometimes]),
+            table=np.concatenate([np.empty((0, count), dtype=bool), *rows]),
+        )
