@@ -89,7 +89,7 @@ def sweep(
     with told_clearly():
         if schema:
             with stdout_kept_clean():
-                from validation.sweep import SweepConfig
+                from validation.sweep.sweep import SweepConfig
             print_json(SweepConfig.model_json_schema())
             return
         if config is None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from scenes.scenario import Scenario, ScenarioError
-from validation.design_table import DesignRow, design_table
+from validation.design.design_table import DesignRow, design_table
 
 
 def design_rows(

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Image
 from mmslam import output, pictures_3d
-from validation import figures, views
-from validation.resolution_bars import draw_resolution_bars
-from validation.truth import Truth
+from validation.figures import figures_2d, views
+from validation.figures.resolution_bars import draw_resolution_bars
+from validation.metrics.truth import Truth
 
 DOTS_PER_INCH = 150
 _DEEPEST_DB = -100.0  # below it there is hardly an image
@@ -114,15 +114,15 @@ def image_figure(
     view = views.view_around(np.concatenate(shown))
     figure = _figure(view, extra_width=1.1)
     floor_db = _floor_db(image, estimate, ghosts, corrected=corrected)
-    ax = figures.draw_image(figure.subplots(), image, view=view, floor_db=floor_db)
-    figures.overlay_mirrors(ax, estimate.mirrors, line=corrected)
-    figures.overlay_array(ax, positions, colour=figures.ON_DARK)
+    ax = figures_2d.draw_image(figure.subplots(), image, view=view, floor_db=floor_db)
+    figures_2d.overlay_mirrors(ax, estimate.mirrors, line=corrected)
+    figures_2d.overlay_array(ax, positions, colour=figures_2d.ON_DARK)
     if frequencies is not None:
         draw_resolution_bars(ax, view, _brightest_point(image), positions, frequencies)
     if corrected:
-        figures.overlay_targets(ax, estimate.targets)
-        figures.overlay_paths(ax, estimate.users, width=1.2)
-        figures.overlay_users(ax, estimate.users)
+        figures_2d.overlay_targets(ax, estimate.targets)
+        figures_2d.overlay_paths(ax, estimate.users, width=1.2)
+        figures_2d.overlay_users(ax, estimate.users)
     ax.set_title(
         "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
     )
@@ -142,8 +142,8 @@ def _floor_db(
     things = np.array([*middles, *places]).reshape(-1, 3) if corrected else ghosts
     faintest = views.faintest_db(image, things, within=_NEAR)
     if faintest is None:
-        return figures.FLOOR_DB
-    return float(np.clip(10 * np.floor((faintest - 10) / 10), _DEEPEST_DB, figures.FLOOR_DB))
+        return figures_2d.FLOOR_DB
+    return float(np.clip(10 * np.floor((faintest - 10) / 10), _DEEPEST_DB, figures_2d.FLOOR_DB))
 
 
 def _brightest_point(image: Image) -> Float[np.ndarray, " 3"]:
@@ -158,10 +158,10 @@ def angle_range_figure(estimate: Estimate) -> Figure:
     axes = figure.subplots(len(estimate.maps), 2, squeeze=False)
     for row, whole, part in zip(axes, estimate.maps, estimate.close_ups, strict=True):
         user = users.get(whole.user)
-        figures.draw_angle_range_map(row[0], whole, user)
+        figures_2d.draw_angle_range_map(row[0], whole, user)
         row[0].set_title(f"Uplink of {whole.user}")
         peak = max(float(np.abs(shown.values).max()) for shown in (whole, part))
-        figures.draw_angle_range_map(row[1], part, user, peak=peak)
+        figures_2d.draw_angle_range_map(row[1], part, user, peak=peak)
         row[1].set_title("enlarged")
     return figure
 
@@ -187,7 +187,7 @@ def localization_figure(
     view = views.view_around(points)
     figure = _figure(view, extra_width=3.6 if found else 0.0, extra_height=0.5)
     columns = figure.add_gridspec(1, 2 if found else 1, width_ratios=[2.1, 1][: 1 + bool(found)])
-    ax = figures.draw_localization(
+    ax = figures_2d.draw_localization(
         figure.add_subplot(columns[0]),
         estimate,
         positions,
@@ -199,7 +199,7 @@ def localization_figure(
     if found:
         rows = columns[1].subgridspec(len(found), 1)
         for row, user in enumerate(found):
-            figures.draw_close_up(
+            figures_2d.draw_close_up(
                 figure.add_subplot(rows[row]), user, truth.user_position.get(user.name)
             )
     silent = [
@@ -208,7 +208,9 @@ def localization_figure(
         if user.position is None
     ]
     if silent:
-        ax.text(0.02, 0.98, "\n".join(silent), transform=ax.transAxes, va="top", color=figures.USER)
+        ax.text(
+            0.02, 0.98, "\n".join(silent), transform=ax.transAxes, va="top", color=figures_2d.USER
+        )
     figure.legend(
         handles=list(_legend(estimate, bool(true_positions or true_walls))),
         loc="outside lower center",
@@ -221,16 +223,16 @@ def localization_figure(
 
 def _legend(estimate: Estimate, truth_known: bool) -> Iterable[Line2D]:
     if estimate.mirrors:
-        yield Line2D([], [], color=figures.MIRROR, ls="--", lw=1.8, label="mirror")
+        yield Line2D([], [], color=figures_2d.MIRROR, ls="--", lw=1.8, label="mirror")
     if any(user.path is not None for user in estimate.users):
-        yield Line2D([], [], color=figures.PATH, lw=1.6, label="path")
+        yield Line2D([], [], color=figures_2d.PATH, lw=1.6, label="path")
     if any(user.position is not None for user in estimate.users):
         yield Line2D(
-            [], [], color=figures.USER, marker="o", ls="", label=r"user, 1$\sigma$ and 2$\sigma$"
+            [], [], color=figures_2d.USER, marker="o", ls="", label=r"user, 1$\sigma$ and 2$\sigma$"
         )
     if truth_known:
         yield Line2D(
-            [], [], color=figures.INK, marker="o", mfc="none", ms=9, ls="", label="true user"
+            [], [], color=figures_2d.INK, marker="o", mfc="none", ms=9, ls="", label="true user"
         )
         yield Line2D([], [], color="#c9d1d6", lw=7, label="true wall")
 

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from estimator.results.estimate import Estimate, Image
-from validation import figures, figures_3d, views
-from validation.truth import Truth
+from validation.figures import figures_2d, figures_3d, views
+from validation.metrics.truth import Truth
 
 _CLOSE_UPS = 3
 
@@ -37,8 +37,8 @@ def volume_figure(
             positions,
             view,
             box,
-            colour=figures.ON_DARK,
-            array_colour=figures.ON_DARK,
+            colour=figures_2d.ON_DARK,
+            array_colour=figures_2d.ON_DARK,
             users=corrected,
         )
     figure.suptitle(
@@ -77,7 +77,7 @@ def space_figure(
     if found:
         rows = grid[-1].subgridspec(len(found), 1)
         for row, user in enumerate(found):
-            figures.draw_close_up(
+            figures_2d.draw_close_up(
                 figure.add_subplot(rows[row]), user, truth.user_position.get(user.name)
             )
     silent = [
@@ -86,7 +86,7 @@ def space_figure(
         if user.position is None
     ]
     if silent:
-        figure.text(0.01, 0.99, "\n".join(silent), va="top", color=figures.USER)
+        figure.text(0.01, 0.99, "\n".join(silent), va="top", color=figures_2d.USER)
     figure.suptitle("What was found (rings: where users really are)")
     return figure
 

@@ -14,7 +14,7 @@ from mmslam import output
 from mmslam.measurement_files import simulate_interruptibly
 from mmslam.result import result_document, to_json
 from scenes.scenario import Scenario, ScenarioError
-from validation.truth import Truth, read_truth, truth_from_dataset
+from validation.metrics.truth import Truth, read_truth, truth_from_dataset
 
 
 @dataclass(frozen=True, kw_only=True)

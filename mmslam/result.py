@@ -13,8 +13,8 @@ from estimator.compute import engine
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
 from mmslam.output import FORMAT
-from validation.metrics import WallError, position_error, wall_errors
-from validation.truth import Truth
+from validation.metrics.errors import WallError, position_error, wall_errors
+from validation.metrics.truth import Truth
 
 PACKAGES = (
     "mmslam",

@@ -108,8 +108,8 @@ def _draw(scenario: Scenario, path: Path) -> Path:
     with stdout_kept_clean():
         from mmslam.pictures import DOTS_PER_INCH
         from simulator.scene.scenario_paths import scenario_paths
-        from validation.scenario_plan import draw_scenario
-        from validation.scenario_view import draw_view
+        from validation.figures.scenario_plan import draw_scenario
+        from validation.figures.scenario_view import draw_view
 
         paths = scenario_paths(scenario)
     figure = Figure(figsize=(14, 6.6), layout="constrained")

@@ -13,7 +13,7 @@ from mmslam import output
 from mmslam.interruption import ResumableInterruption, interruptions_held
 from mmslam.work_progress import WorkProgress, told_time
 from simulator.dataset.task_runner import WorkError, Workers, compute_in_one_thread
-from validation.sweep import (
+from validation.sweep.sweep import (
     Outcome,
     SweepConfig,
     SweepJob,
@@ -23,7 +23,7 @@ from validation.sweep import (
     run_sweep,
     statistics,
 )
-from validation.sweep_tables import error_dataset, error_table
+from validation.sweep.tables import error_dataset, error_table
 
 SUMMARY, TABLE, STORE = "sweep.json", "errors.csv", "errors.zarr"
 FIGURES = ("errors.png", "distribution.png")
@@ -183,7 +183,7 @@ def _write_figures(folder: Path, config: SweepConfig, outcomes: Sequence[Outcome
     from matplotlib.figure import Figure
 
     from mmslam.pictures import DOTS_PER_INCH
-    from validation.sweep_figures import draw_distribution, draw_errors, draw_found
+    from validation.sweep.figures import draw_distribution, draw_errors, draw_found
 
     figure = Figure(figsize=(7.5, 7), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[4, 1])

@@ -15,8 +15,8 @@ from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
 from mmslam import output
 from mmslam.moving_users import MovingUser, track_store
 from mmslam.result import plain, to_json, versions
-from validation.metrics import position_error
-from validation.truth import read_truth
+from validation.metrics.errors import position_error
+from validation.metrics.truth import read_truth
 
 Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
 """Where each user truly is at each time; empty where it is not known."""

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from estimator.results.estimate import Mirror
 from mmslam.moving_users import MovingUser
-from validation import figures, views
+from validation.figures import figures_2d, views
 
 _CIRCLE = np.linspace(0, 2 * np.pi, 60)
 _REGION = 5.99  # χ² of two coordinates that holds 95 %
@@ -43,11 +43,11 @@ def track_figure(
     plan, near = figure.subplots(1, 2)
     for ax, points in ((plan, [positions, *walls, *ways, *known]), (near, [*ways, *known])):
         if points:
-            figures.in_metres(ax, views.view_around(np.concatenate(points)))
+            figures_2d.in_metres(ax, views.view_around(np.concatenate(points)))
         for colour, user in zip(np.resize(_COLOURS, len(users)), users, strict=True):
             _draw_user(ax, user, truths, str(colour))
-    figures.overlay_mirrors(plan, mirrors, colour=figures.MIRROR)
-    figures.overlay_array(plan, positions)
+    figures_2d.overlay_mirrors(plan, mirrors, colour=figures_2d.MIRROR)
+    figures_2d.overlay_array(plan, positions)
     plan.set_title("Room and tracks")
     near.set_title("Tracks, smoothed, with their 95 % ellipses")
     near.legend(loc="best", fontsize=8)
@@ -62,7 +62,7 @@ def _draw_user(
 ) -> None:
     true = [truth[user.name][:2] for truth in truths if user.name in truth]
     if true:
-        ax.plot(*np.array(true).T, "o", mfc="none", mec=figures.INK, ms=9, label="truth")
+        ax.plot(*np.array(true).T, "o", mfc="none", mec=figures_2d.INK, ms=9, label="truth")
     located = [answer.position[:2] for answer in user.answers if answer.position is not None]
     if located:
         ax.plot(*np.array(located).T, "x", color="0.4", ms=7, zorder=5, label="located")

@@ -13,10 +13,16 @@ from rich.text import Text
 from mmslam.interruption import ResumableInterruption
 from mmslam.output import OutputError
 from mmslam.progress import StageProgress
-from validation.claim import Claim, Effort, Tell
-from validation.claim_runs import ClaimRun, claims_digest, run_claims, run_document, write_aside
 from validation.claims import ALL_CLAIMS
-from validation.results_page import drifted, read_record, record_results, to_text
+from validation.harness.claim import Claim, Effort, Tell
+from validation.harness.claim_runs import (
+    ClaimRun,
+    claims_digest,
+    run_claims,
+    run_document,
+    write_aside,
+)
+from validation.harness.results_page import drifted, read_record, record_results, to_text
 
 SUMMARY = "claims.json"
 _WIDTH = 150  # of the table where there is no terminal, in characters

@@ -40,8 +40,8 @@ from scenes.files.toml_writer import toml_text
 from simulator.dataset.builder import make_dataset, plan_dataset
 from simulator.dataset.task_runner import Workers
 from validation.claims import ALL_CLAIMS
-from validation.sweep import Outcome, plan_sweep
-from validation.sweep_tables import error_dataset
+from validation.sweep.sweep import Outcome, plan_sweep
+from validation.sweep.tables import error_dataset
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 DOCS = CHECKOUT / "docs"

@@ -6,7 +6,7 @@ import pytest
 from estimator.measurement.model import Echo, Measurement, Uplink
 from estimator.results.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
 from estimator.results.pixel_grid import PixelGrid
-from validation.truth import Truth
+from validation.metrics.truth import Truth
 
 
 @pytest.fixture

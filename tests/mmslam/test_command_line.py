@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from estimator.measurement.store import read_measurement
 from mmslam.cli import app
-from validation.truth import read_truth
+from validation.metrics.truth import read_truth
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 

@@ -10,7 +10,7 @@ from estimator.measurement.model import Measurement, MeasurementError, Uplink
 from estimator.measurement.store import measurement_to_dataset, write_measurement
 from estimator.results.estimate import UserEstimate
 from mmslam.moving_users import track_answers, track_store
-from validation.point_scatterer import complex_noise, point_uplink
+from validation.analytic.point_scatterer import complex_noise, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 101)  # 0.4 m of unambiguous path
 POSITIONS = np.stack([np.arange(-16, 16) * 0.5e-3, np.zeros(32), np.zeros(32)], axis=1)

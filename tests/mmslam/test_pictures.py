@@ -8,7 +8,7 @@ from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate
 from mmslam import output
 from mmslam.pictures import write_pictures
-from validation.truth import Truth
+from validation.metrics.truth import Truth
 
 
 def test_all_four_figures_are_drawn_and_none_is_blank(

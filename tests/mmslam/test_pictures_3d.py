@@ -10,8 +10,8 @@ from estimator.results.estimate import DirectionMap, Estimate, Image
 from estimator.results.pixel_grid import PixelGrid
 from mmslam.pictures import write_pictures
 from mmslam.result import result_document
-from validation import figures_3d
-from validation.truth import Truth
+from validation.figures import figures_3d
+from validation.metrics.truth import Truth
 
 BRIGHT = np.array([0.1, 0.8, -0.2])
 

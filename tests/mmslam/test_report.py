@@ -10,7 +10,7 @@ from mmslam.pictures import write_pictures
 from mmslam.report import radio_parameters, render_report
 from mmslam.result import result_document
 from scenes.files.loading import load_scenario
-from validation.truth import Truth
+from validation.metrics.truth import Truth
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate
 from mmslam.result import dimensions, result_document, to_json, versions
 from mmslam.summary import summary_lines
-from validation.truth import Truth
+from validation.metrics.truth import Truth
 
 
 def numbers_of(value: Any) -> list[float]:

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from mmslam import validate_command
 from mmslam.cli import app
-from validation.claim import Claim, Effort, Finding, Row, Tell
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 
 
 def row(measured: float) -> Row:

@@ -20,7 +20,7 @@ from scenes.schema.radio import Radio
 from simulator.response.uplink import simulate_uplink
 from simulator.scattering.physical_optics import Ports
 from simulator.scene.radio_scene import RadioScene, facet_ports, radio_scene
-from validation.point_scatterer import complex_noise
+from validation.analytic.point_scatterer import complex_noise
 
 LEVEL_ELEMENTS = 17
 """Elements of our array, evenly spread, over which its noise's level is taken. [-]"""

@@ -1,6 +1,5 @@
 """All claims, by what they are about."""
 
-from validation.claim import Claim
 from validation.claims import (
     closed_forms,
     full_wave,
@@ -10,6 +9,7 @@ from validation.claims import (
     scenarios,
     thesis,
 )
+from validation.harness.claim import Claim
 
 ALL_CLAIMS: tuple[Claim, ...] = (
     *closed_forms.CLAIMS,

@@ -4,14 +4,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from validation.canonical_scatterers import (
+from validation.analytic.canonical_scatterers import (
     cylinder_echo_over_series,
     facets_cross_section,
     mean_specular_field,
     plate_cross_section,
     plate_facets,
 )
-from validation.claim import Claim, Effort, Finding, Row, Tell
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 
 COHERENT_LEVELS = (0.0, 0.3, 0.6, 0.9, 1.2)  # k·rms·cosθ of the rough plates
 

@@ -1,16 +1,16 @@
 """The simulator against full-wave solutions, stored ones and our own."""
 
-from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import full_wave_localization, full_wave_roughness, full_wave_wall
-from validation.full_wave_ghosts import LEAST_CORRELATION as GHOST_CORRELATION
-from validation.full_wave_ghosts import MOST_LEVEL_DB as GHOST_LEVEL_DB
-from validation.full_wave_ghosts import compare_ghosts
-from validation.full_wave_reference import (
+from validation.full_wave.ghost_comparison import LEAST_CORRELATION as GHOST_CORRELATION
+from validation.full_wave.ghost_comparison import MOST_LEVEL_DB as GHOST_LEVEL_DB
+from validation.full_wave.ghost_comparison import compare_ghosts
+from validation.full_wave.wall_comparison import (
     LEAST_CORRELATION,
     MOST_LEVEL_DB,
     compare_with_full_wave,
 )
-from validation.metrics import ErrorSummary, error_summary
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
+from validation.metrics.errors import ErrorSummary, error_summary
 from validation.reference import ROUGH_WALL, TWO_CYLINDERS
 
 STORED = "2-D method of moments, TM, 0.15 mm rms, 1 mm correlation; checked to 4e-6"

@@ -8,9 +8,9 @@ from scipy.constants import speed_of_light
 from estimator.imaging.backprojection import backproject, focus_uplink
 from estimator.imaging.range_migration import range_migration
 from estimator.results.pixel_grid import PixelGrid
-from validation.claim import Claim, Effort, Finding, Row, Tell
+from validation.analytic.point_scatterer import point_echo, point_uplink
 from validation.experiments import simulator_on_points
-from validation.point_scatterer import point_echo, point_uplink
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 
 BAND = np.linspace(220e9, 295e9, 401)
 CENTRE = float(BAND.mean())

@@ -2,12 +2,12 @@
 
 from matplotlib.figure import Figure
 
-from validation.calibration import coverage
-from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import baselines as others
 from validation.experiments import position_bounds as bounds
 from validation.experiments import traps, uncertainty_calibration
-from validation.trap_rooms import TRAPS
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
+from validation.metrics.coverage import coverage
+from validation.trials.trap_rooms import TRAPS
 
 NO_ANSWER = 1e3  # an error that stands for none [m]
 

@@ -13,15 +13,15 @@ from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.materials.layered_media import Dielectric, reflection, transmission
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.physical_optics import scattered
-from validation.canonical_scatterers import half_shadowed_plate, ports
-from validation.claim import Claim, Effort, Finding, Row, Tell
-from validation.path_solver import (
+from validation.analytic.canonical_scatterers import half_shadowed_plate, ports
+from validation.analytic.sionna_paths import (
     LIMIT_AMPLITUDE,
     LIMIT_LENGTH,
     RandomScene,
     compare_paths,
     random_scene,
 )
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 
 
 def reciprocity(effort: Effort, tell: Tell) -> Finding:

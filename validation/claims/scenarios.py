@@ -14,13 +14,13 @@ from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.calibration import position_errors
-from validation.claim import Claim, Effort, Finding, Row, Tell
-from validation.figures import draw_localization
-from validation.metrics import ErrorSummary, error_summary, wall_errors
-from validation.roughness_floor import roughness_floor
-from validation.truth import Truth, truth_from_dataset
-from validation.views import estimate_points, view_around
+from validation.bounds.roughness_floor import roughness_floor
+from validation.figures.figures_2d import draw_localization
+from validation.figures.views import estimate_points, view_around
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
+from validation.metrics.coverage import position_errors
+from validation.metrics.errors import ErrorSummary, error_summary, wall_errors
+from validation.metrics.truth import Truth, truth_from_dataset
 
 SEEDS = 10
 

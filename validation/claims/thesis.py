@@ -5,7 +5,6 @@ from types import ModuleType
 from matplotlib.figure import Figure
 
 from scenes.files.loading import load_scenario
-from validation.claim import Claim, Effort, Finding, Row, Tell
 from validation.experiments import (
     eq02_design_numbers,
     fig02_07_rcs_drywall,
@@ -16,7 +15,8 @@ from validation.experiments import (
     fig04_14_lab_two_walls,
 )
 from validation.experiments.fig04_angle_spectra import TOLERANCE_DEG, draw, spectra_of
-from validation.hidden_imaging import draw_hidden, hidden_rows
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
+from validation.trials.hidden_imaging import draw_hidden, hidden_rows
 
 SEEDS = 10
 

@@ -42,7 +42,7 @@ from validation.baselines.single_array import single_array
 from validation.baselines.steered_ranging import steered_ranging
 from validation.baselines.tdoa import tdoa
 from validation.baselines.toa_trilateration import toa_trilateration
-from validation.metrics import ErrorSummary, error_summary
+from validation.metrics.errors import ErrorSummary, error_summary
 
 OURS = "ours"
 METHODS: dict[str, Baseline] = {

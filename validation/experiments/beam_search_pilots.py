@@ -53,7 +53,7 @@ from estimator.mapping.map_2d import build_room_map
 from estimator.prediction.channel_2d import predict_channel
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.point_scatterer import complex_noise
+from validation.analytic.point_scatterer import complex_noise
 
 FREQUENCY = 257.5e9
 WAVELENGTH = speed_of_light / FREQUENCY

@@ -3,9 +3,9 @@ r"""Thesis equations (2-15) to (2-28) and (3-1) to (3-3): the numbers, and what 
 Run as ``python -m validation.experiments.eq02_design_numbers [FILE.png]``; some seconds.
 
 Measured means: from the response of the imaging and the matched filter to one ideal point, in
-closed form (:mod:`validation.point_scatterer`), or from the phases of that closed form. Parameters
-of the thesis: 260 elements 0.5 mm apart (13 cm), 220-295 GHz in steps of 75 MHz for the simulation,
-220-329.98 GHz in 5500 points of 20 MHz for the laboratory, users at 1.8 m and 2.8 m.
+closed form (:mod:`validation.analytic.point_scatterer`), or from the phases of that closed form.
+Parameters of the thesis: 260 elements 0.5 mm apart (13 cm), 220-295 GHz in steps of 75 MHz for the
+simulation, 220-329.98 GHz in 5500 points of 20 MHz for the laboratory, users at 1.8 m and 2.8 m.
 
 What the thesis leaves open, and what was chosen: which width is meant (-3 dB of an untapered
 aperture; the rounder c/2B is the distance from peak to first zero, and both are measured); the
@@ -38,8 +38,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
-from validation.claim import Row
-from validation.design_numbers import (
+from validation.design.design_numbers import (
     FAR,
     NEAR,
     SIMULATION,
@@ -48,7 +47,8 @@ from validation.design_numbers import (
     Number,
     measured_numbers,
 )
-from validation.row_table import conclude_with_figure
+from validation.harness.claim import Row
+from validation.harness.row_table import conclude_with_figure
 
 
 def measure() -> DesignNumbers:

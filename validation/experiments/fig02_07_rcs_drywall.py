@@ -21,7 +21,8 @@ Claims that are asserted:
 - the drywall's diffuse mean, 15° to 70° off the specular direction, is -28 ± 4 dB *relative to
   the drywall's own specular level* (relative to the metal's it is a reflection coefficient of
   9.3 dB lower);
-- it is that of the closed form of :mod:`validation.rough_plate` for this roughness, within three
+- it is that of the closed form of :mod:`validation.analytic.rough_plate` for this roughness, within
+three
   standard deviations of a mean over so many independent speckles.
 """
 
@@ -40,9 +41,9 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from simulator.scene.radio_scene import scenario_materials
 from simulator.simulation import simulate
-from validation.claim import Row, Tell
-from validation.rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link
-from validation.row_table import conclude
+from validation.analytic.rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link
+from validation.harness.claim import Row, Tell
+from validation.harness.row_table import conclude
 
 SAMPLE = "sample"
 NEAREST_DEG, FARTHEST_DEG = 15.0, 70.0

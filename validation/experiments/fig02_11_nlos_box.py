@@ -20,7 +20,7 @@ range and a resolution cell across; no other target is within 10 dB of it.
 import sys
 
 from scenes.files.loading import load_scenario
-from validation.hidden_imaging import HiddenImaging, conclude_hidden, measure_hidden
+from validation.trials.hidden_imaging import HiddenImaging, conclude_hidden, measure_hidden
 
 HALF_SIZE = (
     "base_station.elements=121",

@@ -31,9 +31,9 @@ from scipy.constants import speed_of_light
 from scenes.files.loading import load_scenario
 from scenes.schema.antenna import GaussianBeam
 from simulator.simulation import simulate
-from validation.claim import Row
-from validation.point_response import peak_cut
-from validation.row_table import conclude_with_figure
+from validation.harness.claim import Row
+from validation.harness.row_table import conclude_with_figure
+from validation.metrics.point_response import peak_cut
 
 DISTANCE = 0.15
 USER = "beam_90"

@@ -32,9 +32,12 @@ from estimator.array.resolution import angular_resolution
 from estimator.channel.steering import angle_spectrum
 from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
-from validation import figures, views
-from validation.claim import Row, Tell
-from validation.hidden_user import (
+from validation.figures import figures_2d, views
+from validation.figures.resolution_bars import draw_resolution_bars
+from validation.harness.claim import Row, Tell
+from validation.harness.row_table import conclude_with_figure
+from validation.metrics.point_response import PeakCut, peak_cut
+from validation.trials.hidden_user import (
     WIDTHS_WITHIN,
     UserTrial,
     draw_errors,
@@ -44,9 +47,6 @@ from validation.hidden_user import (
     user_rows,
     wall_rows,
 )
-from validation.point_response import PeakCut, peak_cut
-from validation.resolution_bars import draw_resolution_bars
-from validation.row_table import conclude_with_figure
 
 SEEDS, QUICK_SEEDS = 10, 3
 MEDIAN, WORST = 0.4e-3, 1.0e-3
@@ -217,9 +217,9 @@ def draw(figure: Figure, result: Slam2d) -> None:
     # As wide as the plan below it, to be compared.
     shown = [views.estimate_points(estimate, positions), bright]
     view = views.view_around(np.concatenate(shown))
-    figures.draw_image(axes[0, 1], image, view=view)
-    figures.overlay_mirrors(axes[0, 1], estimate.mirrors, line=False)
-    figures.overlay_array(axes[0, 1], positions, colour=figures.ON_DARK)
+    figures_2d.draw_image(axes[0, 1], image, view=view)
+    figures_2d.overlay_mirrors(axes[0, 1], estimate.mirrors, line=False)
+    figures_2d.overlay_array(axes[0, 1], positions, colour=figures_2d.ON_DARK)
     echo = trial.seen.measurement.echo
     if echo is not None:
         wall = 0.5 * (estimate.mirrors[0].start + estimate.mirrors[0].end)

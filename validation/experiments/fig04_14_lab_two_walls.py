@@ -30,9 +30,11 @@ from matplotlib.figure import Figure
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
-from validation import figures, views
-from validation.claim import Row, Tell
-from validation.hidden_user import (
+from validation.figures import figures_2d, views
+from validation.figures.scenario_plan import draw_scenario
+from validation.harness.claim import Row, Tell
+from validation.harness.row_table import conclude_with_figure
+from validation.trials.hidden_user import (
     UserTrial,
     draw_map,
     draw_plan,
@@ -41,8 +43,6 @@ from validation.hidden_user import (
     user_rows,
     wall_rows,
 )
-from validation.row_table import conclude_with_figure
-from validation.scenario_plan import draw_scenario
 
 WALLS = ("drywall_1", "drywall_2")
 MEDIAN, WORST = 3e-3, 5e-3
@@ -118,12 +118,12 @@ def draw(figure: Figure, result: LabTwoWalls) -> None:
     shown = [views.estimate_points(estimate, positions), views.ghost_points(estimate)]
     view = views.view_around(np.concatenate([*shown, views.bright_points(raw)]))
     for ax, image, folded in ((axes[0, 1], raw, False), (axes[0, 2], corrected, True)):
-        figures.draw_image(ax, image, view=view, floor_db=-60.0)
-        figures.overlay_array(ax, positions, colour=figures.ON_DARK)
+        figures_2d.draw_image(ax, image, view=view, floor_db=-60.0)
+        figures_2d.overlay_array(ax, positions, colour=figures_2d.ON_DARK)
         mirrors = estimate.mirrors if folded else estimate.mirrors[:1]
-        figures.overlay_mirrors(ax, mirrors, line=False)
+        figures_2d.overlay_mirrors(ax, mirrors, line=False)
     axes[0, 1].set_title("4.15: raw, the second wall behind the first")
-    figures.overlay_paths(axes[0, 2], estimate.users, width=1.0)
+    figures_2d.overlay_paths(axes[0, 2], estimate.users, width=1.0)
     axes[0, 2].set_title("4.15: folded")
     draw_map(axes[1, 0], trial)
     axes[1, 0].set_title(f"4.16: {axes[1, 0].get_title()}", fontsize=10)
@@ -133,7 +133,7 @@ def draw(figure: Figure, result: LabTwoWalls) -> None:
     if user.position is None:
         axes[1, 2].set_axis_off()
     else:
-        figures.draw_close_up(axes[1, 2], user, trial.seen.truth.user_position[user.name])
+        figures_2d.draw_close_up(axes[1, 2], user, trial.seen.truth.user_position[user.name])
         axes[1, 2].legend(fontsize=8)
 
 

@@ -20,7 +20,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from estimator.channel.steering import angle_spectrum
-from validation.point_scatterer import point_uplink
+from validation.analytic.point_scatterer import point_uplink
 
 FREQUENCY = 220e9
 ELEMENTS = 260

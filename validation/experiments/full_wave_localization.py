@@ -7,15 +7,15 @@ takes about two minutes a trial on two idle cores, keeps what it solved in FOLDE
 The scene is the thesis' figures 4.9 to 4.12 at full size: 260 positions 0.5 mm apart, 220 to
 295 GHz in 1001 points, a conducting wall 0.40 m long, 0.8 m away and turned by 45°, the user
 1 m behind it. Echo and uplink are solutions of Maxwell's equations in two dimensions
-(:mod:`validation.method_of_moments`), with cylindrical waves; noise of 20 dB SNR is added as
-the simulator does. Beside each trial stands the simulator's own of the *same* frozen wall and
+(:mod:`validation.full_wave.method_of_moments`), with cylindrical waves; noise of 20 dB SNR is added
+as the simulator does. Beside each trial stands the simulator's own of the *same* frozen wall and
 the same noise, so that what differs is physical optics alone.
 
 Chosen: the beam is that of a line source at a complex place, an exact solution, with the
 thesis' width of 0.1 rad on its axis; the direct path from user to array is left out, as the
 beam sends nothing there (50 dB down at 0.48 rad). Roughness: that of ``slam_2d`` (0.05 mm rms,
 0.3 mm long, Gaussian) and a rougher one (0.15 mm, 1 mm). Fields are solved for at some 300
-Chebyshev frequencies and interpolated (:mod:`validation.full_wave_band`).
+Chebyshev frequencies and interpolated (:mod:`validation.full_wave.band_interpolation`).
 
 Claims that are asserted, for full-wave data: with the roughness of ``slam_2d`` the median error
 of the user is below 0.4 mm and every one below 1.0 mm, the limits set for the simulated scene;
@@ -43,12 +43,12 @@ from scenes.schema.objects import Plate
 from simulator.receiver.receiver import received
 from simulator.scene.truth import scenario_truth
 from simulator.simulation import simulate
-from validation.calibration import position_errors
-from validation.full_wave_band import band_fields
-from validation.line_source import LineSource
-from validation.metrics import wall_error
-from validation.strip_scattering import StripFields, StripScene
-from validation.truth import Truth, truth_from_dataset
+from validation.full_wave.band_interpolation import band_fields
+from validation.full_wave.line_source import LineSource
+from validation.full_wave.strip_scattering import StripFields, StripScene
+from validation.metrics.coverage import position_errors
+from validation.metrics.errors import wall_error
+from validation.metrics.truth import Truth, truth_from_dataset
 
 TRIALS = 10
 WALL, USER = "wall", "user"

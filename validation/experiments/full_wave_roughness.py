@@ -7,8 +7,8 @@ Not in the thesis, which calculates with full waves only. A conducting wall of 8
 place of its 40 cm; all else is the scene of its figures 4.9 to 4.12: the wall 0.8 m away and
 turned by 45°, an aperture of 13 cm, 220 to 295 GHz, a user 1 m behind the wall with a beam of
 0.1 rad. Positions 1 mm apart and 501 frequencies do for so short a wall, and the fields are
-solved for at some 90 of them (:mod:`validation.full_wave_band`). For each rms height and
-correlation length (Gaussian) the same frozen realisations are given to the simulator, as a
+solved for at some 90 of them (:mod:`validation.full_wave.band_interpolation`). For each rms height
+and correlation length (Gaussian) the same frozen realisations are given to the simulator, as a
 scenario, and to the method of moments; cylindrical waves, no noise. What is compared, over all
 realisations at once, by magnitude of the complex correlation and by level, simulated over full
 wave:
@@ -68,7 +68,7 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from simulator.simulation import simulate
 from validation.experiments.full_wave_localization import USER, WALL, strip_scene
-from validation.full_wave_band import band_fields
+from validation.full_wave.band_interpolation import band_fields
 
 Part = Literal["echo", "image", "uplink"]
 PARTS: tuple[Part, ...] = ("echo", "image", "uplink")

@@ -2,9 +2,9 @@ r"""The method of moments on its own: how exact and how fast it is, and its long
 
 Run as ``python -m validation.experiments.full_wave_wall`` for the checks (half a minute), or as
 ``python -m validation.experiments.full_wave_wall FILE.npz [REFERENCE.npz]`` to solve the thesis'
-wall at full size and write it in the layout of :mod:`validation.full_wave_reference`: 0.40 m long,
-0.8 m away, 260 positions, 1001 frequencies from 220 to 295 GHz, the user 1 m behind it with an
-open and with a beam antenna. What is solved is kept in the folder ``FILE.parts`` and taken up
+wall at full size and write it in the layout of :mod:`validation.full_wave.wall_comparison`: 0.40 m
+long, 0.8 m away, 260 positions, 1001 frequencies from 220 to 295 GHz, the user 1 m behind it with
+an open and with a beam antenna. What is solved is kept in the folder ``FILE.parts`` and taken up
 again when started anew. The wall is that of REFERENCE, which is then compared with, or else a draw
 of 0.15 mm rms, l = 1 mm.
 
@@ -29,13 +29,18 @@ from scipy.special import hankel2, jv
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
-from validation.conducting_contour import circle
 from validation.experiments.full_wave_localization import USER, WALL, strip_scene
-from validation.full_wave_reference import COMPARED, read_reference
-from validation.line_source import LineSource
-from validation.method_of_moments import scattered_fields
+from validation.full_wave.conducting_contour import circle
+from validation.full_wave.line_source import LineSource
+from validation.full_wave.method_of_moments import scattered_fields
+from validation.full_wave.strip_scattering import (
+    StripFields,
+    StripScene,
+    strip_fields,
+    strip_response,
+)
+from validation.full_wave.wall_comparison import COMPARED, read_reference
 from validation.reference import ROUGH_WALL
-from validation.strip_scattering import StripFields, StripScene, strip_fields, strip_response
 
 ROUGHNESS = (
     "waves=cylindrical",

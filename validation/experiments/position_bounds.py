@@ -5,7 +5,8 @@ on two cores, with ``--quick`` one. The numbers go to a CSV file beside the figu
 
 Not in the thesis, which states no bound. Chosen:
 
-- *Free space*: the closed-form pilot of :mod:`validation.point_scatterer`, direct (70°) and over
+- *Free space*: the closed-form pilot of :mod:`validation.analytic.point_scatterer`, direct (70°)
+and over
   one known mirror of 45° (image at 80°); 64 elements of 0.5 mm, 220 to 295 GHz in steps of
   0.25 GHz, 0.6 m of path, 10 dB per channel sample; of SNR, bandwidth, aperture and distance one
   is swept.
@@ -15,8 +16,9 @@ Not in the thesis, which states no bound. Chosen:
   on all of the wall), roughness and noise drawn anew for each trial. With the wall known the
   strongest path is folded over the true mean plane; with the wall estimated the whole estimator
   answers. What it is held against is the root of the sum of squares of the bound (noise, wall
-  known), of the floor of :mod:`validation.roughness_floor`, and, with the wall estimated, of what
-  :mod:`validation.echo_line_bound` leaves of the wall's place.
+  known), of the floor of :mod:`validation.bounds.roughness_floor`, and, with the wall estimated, of
+  what
+  :mod:`validation.bounds.wall_bound` leaves of the wall's place.
 
 Claims that are asserted: the rms error is within a factor of 1.5 of the bound from 0 dB upward, in
 every sweep of free space, and below it by no more than trial scatter (four standard deviations of
@@ -45,11 +47,11 @@ from scenes.scenario import Scenario
 from simulator.response.uplink import simulate_uplink
 from simulator.scene.radio_scene import facet_ports, radio_scene
 from simulator.simulation import simulate
-from validation.echo_line_bound import wall_covariance_bound
-from validation.point_scatterer import complex_noise, point_uplink
-from validation.position_bound import Plane, image_and_slopes, position_error_bound
-from validation.roughness_floor import roughness_floor
-from validation.scenario_bound import scenario_position_bound
+from validation.analytic.point_scatterer import complex_noise, point_uplink
+from validation.bounds.position_bound import Plane, image_and_slopes, position_error_bound
+from validation.bounds.roughness_floor import roughness_floor
+from validation.bounds.scenario_bound import scenario_position_bound
+from validation.bounds.wall_bound import wall_covariance_bound
 
 FACTOR = 1.5
 ESTIMATED_FACTOR = 2.5

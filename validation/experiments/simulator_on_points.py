@@ -3,8 +3,8 @@
 Run as ``python -m validation.experiments.simulator_on_points [FILE.png]``; some seconds.
 
 Not a figure of the thesis; what all of its equations rest on. The closed form
-(:mod:`validation.point_scatterer`) shares no code with either: the radar equation for the echo,
-Friis' equation for the uplink, and a Hankel function for that of a line source.
+(:mod:`validation.analytic.point_scatterer`) shares no code with either: the radar equation for the
+echo, Friis' equation for the uplink, and a Hankel function for that of a line source.
 
 Chosen: the points of ``point_scatterers`` (0.5 to 0.9 m away, up to 13° off broadside), a line of
 260 positions, cylindrical and spherical waves; and in space a plane of 32 × 32 positions 1 mm
@@ -33,10 +33,10 @@ from estimator.imaging.backprojection import backproject
 from estimator.measurement.model import Waves
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.claim import Row
-from validation.point_response import peak_cut
-from validation.point_scatterer import point_echo, point_uplink
-from validation.row_table import conclude_with_figure
+from validation.analytic.point_scatterer import point_echo, point_uplink
+from validation.harness.claim import Row
+from validation.harness.row_table import conclude_with_figure
+from validation.metrics.point_response import peak_cut
 
 CELLS_OFF = 0.05
 WIDTHS_WITHIN = 0.05

@@ -5,7 +5,7 @@ Run as ``python -m validation.experiments.traps [SEEDS [TRAP …]]``.
 Not in the thesis, which knows its one wall beforehand. Each trap is a room in two dimensions
 with walls and users where a careless estimator folds a path that is direct, takes a wall for
 another, a ghost for a wall, an edge for a user, or a bent wave for a mirror's. The rooms are those
-of :mod:`validation.trap_rooms`.
+of :mod:`validation.trials.trap_rooms`.
 
 Claims that are asserted, for every trap and seed: no answer that is called ``found`` has the
 truth outside its 99.9 % region (χ² with two degrees of freedom), and no mirror that is reported
@@ -25,10 +25,10 @@ from estimator.localization.locate import locate
 from estimator.results.estimate import Estimate, Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.calibration import position_errors
-from validation.metrics import distances_from_segment, nearest_wall, wall_error
-from validation.trap_rooms import TRAPS
-from validation.truth import Truth, truth_from_dataset
+from validation.metrics.coverage import position_errors
+from validation.metrics.errors import distances_from_segment, nearest_wall, wall_error
+from validation.metrics.truth import Truth, truth_from_dataset
+from validation.trials.trap_rooms import TRAPS
 
 SEEDS = 3
 REGION = float(chi2.ppf(0.999, 2))

@@ -25,9 +25,9 @@ from estimator.localization.locate import locate
 from estimator.results.estimate import Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.calibration import coverage, normalised_square
-from validation.claim import Tell
-from validation.truth import Truth, truth_from_dataset
+from validation.harness.claim import Tell
+from validation.metrics.coverage import coverage, normalised_square
+from validation.metrics.truth import Truth, truth_from_dataset
 
 TRIALS = 200
 HALF_SIZE = (

@@ -6,7 +6,7 @@ from estimator.channel.music import music_spectrum
 from estimator.channel.relax import extract_paths, refine_paths
 from estimator.channel.steering import angle_spectrum
 from estimator.measurement.model import MeasurementError, Uplink
-from validation.point_scatterer import complex_noise, point_uplink
+from validation.analytic.point_scatterer import complex_noise, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 101)  # 0.4 m of unambiguous path
 COUNT = 64

@@ -3,7 +3,7 @@ import pytest
 
 from estimator.imaging.image_former import FORMERS, form_image
 from estimator.results.pixel_grid import PixelGrid
-from validation.point_scatterer import point_echo
+from validation.analytic.point_scatterer import point_echo
 
 
 @pytest.mark.parametrize("name", sorted(FORMERS))

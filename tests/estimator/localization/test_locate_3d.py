@@ -11,7 +11,7 @@ from estimator.array.planar_array import planar_array, planar_frame, spans_a_pla
 from estimator.localization.locate import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError
 from estimator.results.estimate import Estimate
-from validation.point_scatterer import complex_noise, point_uplink
+from validation.analytic.point_scatterer import complex_noise, point_uplink
 
 BAND = np.linspace(57e9, 64e9, 71)  # 1.5 m of unambiguous echo range, 3 m of path
 TILT = np.radians(20.0)

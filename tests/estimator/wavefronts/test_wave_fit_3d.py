@@ -5,7 +5,7 @@ from jaxtyping import Float
 from estimator.measurement.model import Echo, Uplink
 from estimator.wavefronts.curvature_search_3d import search_wavefront
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront, towards, wavefront_field
-from validation.point_scatterer import complex_noise, point_echo, point_uplink
+from validation.analytic.point_scatterer import complex_noise, point_echo, point_uplink
 
 BAND = np.linspace(57e9, 64e9, 36)
 

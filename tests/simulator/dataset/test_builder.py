@@ -18,7 +18,7 @@ from simulator.dataset.sample import Row, make_row
 from simulator.dataset.store import DatasetError
 from simulator.dataset.task_runner import Workers
 from simulator.simulation import simulate
-from validation.truth import read_truth
+from validation.metrics.truth import read_truth
 
 HERE = Workers(processes=0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import epsilon_0
 
-from simulator.materials.layered_media import permittivity
+from simulator.materials import permittivity
 from simulator.materials.permittivity import (
     ConstantPermittivity,
     MaterialError,

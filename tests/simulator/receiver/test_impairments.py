@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simulator.receiver.receiver import impairments
+from simulator.receiver import impairments
 
 FREQUENCIES = np.linspace(220e9, 295e9, 1001)
 

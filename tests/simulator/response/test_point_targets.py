@@ -5,7 +5,7 @@ from scipy.constants import speed_of_light
 from scenes.files.loading import load_scenario
 from scenes.scenario import ScenarioError
 from simulator.simulation import simulate
-from validation.point_scatterer import point_echo
+from validation.analytic.point_scatterer import point_echo
 
 SMALL = ["radio.points=21", "base_station.elements=8"]
 

@@ -9,7 +9,7 @@ from scenes.realisations.object_surface import Surface
 from simulator.geometry.facets import surface_facets
 from simulator.geometry.ray_scene import facets_visible
 from simulator.scattering.physical_optics import scattered
-from validation.canonical_scatterers import (
+from validation.analytic.canonical_scatterers import (
     cylinder_echo_over_series,
     facets_cross_section,
     half_shadowed_plate,

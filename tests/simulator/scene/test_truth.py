@@ -10,7 +10,7 @@ from estimator.measurement.store import write_measurement
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
 from simulator.scene.truth import scenario_truth
-from validation.truth import Truth, front_face, read_truth
+from validation.metrics.truth import Truth, front_face, read_truth
 
 
 def scenario(**tables: Any) -> Scenario:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from jaxtyping import Complex, Float
 
+from validation.analytic.point_scatterer import complex_noise, point_uplink
 from validation.baselines.angle_difference import from_differences
 from validation.baselines.arrivals import (
     first_arrival,
@@ -15,7 +16,6 @@ from validation.baselines.multilateration import multilaterate
 from validation.baselines.room import ANCHORS
 from validation.baselines.rssi_ranging import path_loss
 from validation.baselines.scatterer_paths import BouncePath, departure, intersect, user_array
-from validation.point_scatterer import complex_noise, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 501)
 CELL = 299792458 / 75e9
