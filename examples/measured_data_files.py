@@ -15,7 +15,7 @@ import numpy as np
 import scipy.io
 from scipy.constants import speed_of_light
 
-from mmslam.touchstone_files import touchstone_text
+from mmslam.formats.touchstone_files import touchstone_text
 
 CABLE_NS = 2.5
 CROSS_TALK = 3e-4

@@ -8,11 +8,11 @@ from estimator.measurement.model import Measurement
 from estimator.measurement.store import read_measurement, write_measurement
 from estimator.results.estimate import Progress
 from mmslam import output
-from mmslam.export_touchstone import MAPPING, export_touchstone, refuse_foreign_touchstone
-from mmslam.import_measured import Import, import_measured
-from mmslam.import_npz import import_npz
-from mmslam.interruption import interruptions_held
-from mmslam.sweep_mapping import load_mapping
+from mmslam.formats.export_touchstone import MAPPING, export_touchstone, refuse_foreign_touchstone
+from mmslam.formats.import_full_wave import import_npz
+from mmslam.formats.import_measured import Import, import_measured
+from mmslam.formats.mapping import load_mapping
+from mmslam.terminal.interruption import interruptions_held
 from scenes.scenario import Scenario
 
 

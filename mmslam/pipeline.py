@@ -12,7 +12,7 @@ from estimator.measurement.store import read_measurement, write_measurement
 from estimator.results.estimate import Estimate, Progress
 from mmslam import output
 from mmslam.measurement_files import simulate_interruptibly
-from mmslam.result import result_document, to_json
+from mmslam.results.document import result_document, to_json
 from scenes.scenario import Scenario, ScenarioError
 from validation.metrics.truth import Truth, read_truth, truth_from_dataset
 
@@ -128,8 +128,8 @@ def _write_results(
     scenario: Scenario | None,
 ) -> Mapping[str, Any]:
     # matplotlib's import takes half a second that other commands need not wait.
-    from mmslam.pictures import write_pictures
-    from mmslam.report import render_report
+    from mmslam.results.pictures_2d import write_pictures
+    from mmslam.results.report import render_report
 
     started = time.perf_counter()
     pictures = write_pictures(new, measurement, estimate, truth)

@@ -33,8 +33,8 @@ import typer
 from typer.testing import CliRunner
 
 from mmslam.cli import app
-from mmslam.sweep_command import STORE
-from mmslam.sweep_mapping import load_mapping
+from mmslam.commands.sweep import STORE
+from mmslam.formats.mapping import load_mapping
 from scenes.files.loading import load_scenario
 from scenes.files.toml_writer import toml_text
 from simulator.dataset.builder import make_dataset, plan_dataset

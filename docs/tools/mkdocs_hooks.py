@@ -79,7 +79,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are made."""
-    from mmslam.cli import app
+    from mmslam.cli.app import app
 
     made = {"reference/command_line.md": command_line_page(app)}
     if not (Path(config.docs_dir) / "results" / "index.md").exists():

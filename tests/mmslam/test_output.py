@@ -243,7 +243,7 @@ def test_ctrl_c_in_the_middle_of_a_write_leaves_nothing_half_written(tmp_path: P
     program = textwrap.dedent("""
         import sys, time
         from pathlib import Path
-        from mmslam.failures import told_clearly
+        from mmslam.terminal.exit_codes import told_clearly
         from mmslam.output import refuse_foreign_results, replacing
         with told_clearly(), replacing(Path(sys.argv[1]), refuse_foreign_results) as new:
             new.mkdir()

@@ -1,0 +1,175 @@
+"""Commands about one room: its scenario, its measurement, its estimate."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mmslam.cli.options import AsJson, OutFile, OutFolder, Overrides, ScenarioName, Seed
+from mmslam.cli.printing import print_json, print_outcome, print_written
+from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
+
+
+def scenes(
+    name: Annotated[
+        str | None, typer.Argument(help="A built-in name, or the path of a TOML file.")
+    ] = None,
+    overrides: Overrides = None,
+    show: Annotated[
+        bool,
+        typer.Option("--show", help="Draw NAME, from above and in 3-D, with its specular paths."),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.png", help="Where to draw it [out/NAME.png]."),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            "--export",
+            metavar="DIR",
+            help="Write NAME to DIR: TOML, and Mitsuba XML with PLY meshes for Sionna and Blender. "
+            "Without NAME, the TOML of all.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the roughness in the exported facets.")] = 0,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of scenario files.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the built-in scenarios, or look at, draw or export one."""
+    with told_clearly():
+        from mmslam.commands import scenarios as commands
+        from scenes.files.loading import load_scenario, scenario_schema
+
+        if schema:
+            print_json(scenario_schema())
+        elif name is None:
+            if show or overrides:
+                raise typer.BadParameter("--show and --set need the NAME of a scenario")
+            commands.list_scenarios(export=export, as_json=as_json)
+        else:
+            scenario = load_scenario(name, overrides or [])
+            commands.show_scenario(
+                scenario,
+                picture=_picture(show, out, scenario.name),
+                export=export,
+                seed=seed,
+                as_json=as_json,
+            )
+
+
+def run(
+    scenario: ScenarioName,
+    overrides: Overrides = None,
+    seed: Seed = 0,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate a scenario, image it, fold the ghosts back, locate the users, and report.
+
+    Writes to `--out` (default `out/SCENARIO-SEED/`) the result, the measurement, the figures
+    and a report. What an earlier run wrote there is replaced; a foreign folder is refused.
+    """
+    with told_clearly():
+        from mmslam.terminal.stage_progress import StageProgress
+        from scenes.files.loading import load_scenario
+
+        loaded = load_scenario(scenario, overrides or [])
+        folder = out or Path("out") / f"{loaded.name}-{seed}"
+        with stdout_kept_clean(), StageProgress() as progress:
+            from mmslam.pipeline import run_scenario
+
+            outcome = run_scenario(loaded, seed=seed, folder=folder, progress=progress)
+        print_outcome(outcome.result, outcome.folder, as_json)
+
+
+def simulate(
+    scenario: ScenarioName,
+    output: OutFile,
+    overrides: Overrides = None,
+    seed: Seed = 0,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate the measurement of a scenario, and write it with its truth to one file."""
+    with told_clearly():
+        from mmslam.terminal.stage_progress import StageProgress
+        from scenes.files.loading import load_scenario
+
+        loaded = load_scenario(scenario, overrides or [])
+        with stdout_kept_clean(), StageProgress() as progress:
+            from mmslam.measurement_files import simulate_to_file
+
+            measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
+        print_written(output, measurement, as_json)
+
+
+def locate(
+    measurement: Annotated[Path, typer.Argument(metavar="FILE.zarr", help="The measurement.")],
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
+    ] = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Locate the users of any measurement: simulated, imported or your own.
+
+    Writes to `--out` (default `out/SCENARIO-SEED-located/`) what `run` writes, but for the
+    measurement. A truth in the file is opened after the estimate only, to compare.
+    """
+    with told_clearly():
+        from mmslam.terminal.stage_progress import StageProgress
+
+        with stdout_kept_clean(), StageProgress() as progress:
+            from mmslam.pipeline import locate_measurement
+
+            outcome = locate_measurement(measurement, sample=sample, folder=out, progress=progress)
+        print_outcome(outcome.result, outcome.folder, as_json)
+
+
+def track(
+    measurements: Annotated[
+        Path, typer.Argument(metavar="FILE.zarr", help="A dataset whose samples are times.")
+    ],
+    step: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Time between samples [what `time` in FILE says]."),
+    ] = None,
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M2_S3",
+            help="How freely users move: spectral density [0.5, of somebody who walks].",
+        ),
+    ] = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Follow users that move: locate them at each time, and join the answers to tracks.
+
+    Outliers are dropped, ambiguous answers decided, times without one bridged. Writes the tracks
+    and their figure to `--out` (default `out/FILE-track/`).
+    """
+    with told_clearly():
+        from mmslam.terminal.stage_progress import StageProgress
+
+        with stdout_kept_clean(), StageProgress() as progress:
+            from mmslam.commands.track import track_lines, track_to_folder
+
+            tracked = track_to_folder(
+                measurements, folder=out, step=step, acceleration=acceleration, progress=progress
+            )
+        if as_json:
+            print_json(tracked.document)
+            return
+        for line in track_lines(tracked.document, tracked.folder):
+            typer.echo(line)
+
+
+def _picture(show: bool, out: Path | None, name: str) -> Path | None:
+    if not show:
+        if out is not None:
+            raise typer.BadParameter("--out says where the picture goes; add --show")
+        return None
+    return out or Path("out") / f"{name}.png"

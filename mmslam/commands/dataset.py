@@ -1,0 +1,165 @@
+"""Making datasets: what the command does, says and answers."""
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from mmslam.output import OutputError
+from mmslam.terminal.interruption import ResumableInterruption, interruptions_held
+from mmslam.terminal.task_progress import WorkProgress, told_size, told_time
+from simulator.dataset.builder import (
+    DatasetJob,
+    Forecast,
+    Summary,
+    forecast,
+    make_dataset,
+    plan_dataset,
+    progress_of,
+)
+from simulator.dataset.store import DatasetError
+from simulator.dataset.task_runner import WorkError, Workers
+
+_TOLD_FAILURES = 10
+
+
+def make(config: Path, target: Path, *, workers: Workers, retry_failed: bool) -> Mapping[str, Any]:
+    """Make a dataset, with progress on stderr, and return the document for JSON.
+
+    Raises
+    ------
+    ScenarioError
+        If the configuration is wrong.
+    OutputError
+        If the dataset cannot go where it should, or its workers are lost.
+    ResumableInterruption
+        On Ctrl-C; says how to go on.
+    """
+    job = plan_dataset(config, target)
+    with _errors_told(), WorkProgress("samples") as progress:
+        try:
+            if workers.in_this_process:
+                with interruptions_held() as let_through:
+
+                    def step(done: int, failed: int, total: int) -> None:
+                        progress(done, failed, total)
+                        let_through()
+
+                    summary = make_dataset(
+                        job, workers=workers, retry_failed=retry_failed, tell=step
+                    )
+            else:
+                summary = make_dataset(
+                    job, workers=workers, retry_failed=retry_failed, tell=progress
+                )
+        except KeyboardInterrupt:
+            done, samples = progress_of(job)
+            raise ResumableInterruption(
+                f"interrupted; {done} of {samples} samples are done: the same command goes on"
+            ) from None
+    return {"file": str(target), **_document(job, summary)}
+
+
+def look_ahead(config: Path, target: Path, *, workers: int) -> Mapping[str, Any]:
+    """Judge by one sample what a dataset will take; return the document for JSON."""
+    job = plan_dataset(config, target)
+    with _errors_told():
+        found = forecast(job)
+    return _forecast_document(found, target, workers)
+
+
+def lines(document: Mapping[str, Any]) -> Iterator[str]:
+    """Say what :func:`make` has returned."""
+    yield (
+        f"{document['file']}: {document['samples']} samples, {document['failed']} failed"
+        + (f", {document['made_now']} made now" if document["made_now"] else "")
+    )
+    for failure in document["failures"][:_TOLD_FAILURES]:
+        values = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
+        yield f"  sample {failure['sample']} failed: {failure['reason']} ({values or 'as it is'})"
+    if document["failed"] > _TOLD_FAILURES:
+        yield f"  … and {document['failed'] - _TOLD_FAILURES} more; see `failure` in the file"
+    if document["failed"]:
+        yield "  `--retry-failed` makes them again"
+
+
+def forecast_lines(document: Mapping[str, Any]) -> Iterator[str]:
+    """Say what :func:`look_ahead` has returned."""
+    workers, seconds = document["workers"], document["sample_s"]
+    yield f"{document['samples']} samples, {seconds:.3g} s each on one thread"
+    yield f"time    {told_time(document['time_s'])} with {workers} workers of this machine"
+    yield (
+        f"size    {told_size(document['size_bytes'])} "
+        f"({told_size(document['sample_bytes'])} a sample, "
+        f"{document['sample_bytes'] / document['raw_bytes']:.2f} of its echo and uplinks)"
+    )
+    yield f"free    {told_size(document['free_bytes'])}"
+    yield (
+        f"memory  {told_size(document['memory_bytes'])} "
+        f"({told_size(document['worker_memory_bytes'])} a worker)"
+    )
+    if document["size_bytes"] > document["free_bytes"]:
+        yield "There is not enough space: free some, or give a smaller count"
+
+
+def chosen_workers(processes: int | None, scheduler: str | None) -> Workers:
+    """Return where work is done: by default one process for each processor."""
+    if scheduler is not None and processes is not None:
+        raise typer.BadParameter("--workers is for this machine's; with --scheduler leave it out")
+    return Workers(processes=_processors() if processes is None else processes, scheduler=scheduler)
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def _errors_told() -> Iterator[None]:
+    try:
+        yield
+    except (DatasetError, WorkError) as error:
+        raise OutputError(str(error)) from error
+
+
+def _document(job: DatasetJob, summary: Summary) -> dict[str, Any]:
+    return {
+        "samples": summary.samples,
+        "failed": summary.failed,
+        "made_now": summary.made_now,
+        "seed": job.config.seed,
+        "failures": [
+            {"sample": one.sample, "reason": one.reason, "parameters": dict(one.parameters)}
+            for one in summary.failures
+        ],
+    }
+
+
+def _forecast_document(found: Forecast, target: Path, workers: int) -> dict[str, Any]:
+    place = target.resolve().parent
+    while not place.exists():
+        place = place.parent
+    return {
+        "samples": found.samples,
+        "workers": workers,
+        "sample_s": found.sample_seconds,
+        "time_s": found.samples * found.sample_seconds / workers,
+        "sample_bytes": found.sample_bytes,
+        "raw_bytes": found.raw_bytes,
+        "size_bytes": found.samples * found.sample_bytes,
+        "free_bytes": shutil.disk_usage(place).free,
+        "worker_memory_bytes": found.memory,
+        "memory_bytes": workers * found.memory,
+        "redraws": found.redraws,
+    }
+
+
+def print_lines(told: Iterator[str]) -> None:
+    """Print lines on stdout."""
+    for line in told:
+        typer.echo(line)

@@ -1,0 +1,131 @@
+"""Listing, drawing and exporting scenarios."""
+
+import json
+from pathlib import Path
+
+import typer
+
+from mmslam.output import OutputError
+from mmslam.terminal.exit_codes import stdout_kept_clean
+from scenes.files.loading import load_scenario, scenario_names, scenario_to_toml
+from scenes.files.relocatable import relocatable
+from scenes.scenario import Scenario
+
+
+def list_scenarios(*, export: Path | None, as_json: bool) -> None:
+    """Print the built-in scenarios, and export all of them if a folder is given."""
+    scenarios = [load_scenario(name, []) for name in scenario_names()]
+    if export is not None:
+        for scenario in scenarios:
+            _export_toml(scenario, export)
+    if as_json:
+        listed = [{"name": found.name, "title": found.title} for found in scenarios]
+        typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
+        return
+    width = max((len(scenario.name) for scenario in scenarios), default=0)
+    for scenario in scenarios:
+        typer.echo(f"{scenario.name:<{width}}  {scenario.title}")
+
+
+def show_scenario(
+    scenario: Scenario, *, picture: Path | None, export: Path | None, seed: int, as_json: bool
+) -> None:
+    """Print a scenario, or draw it, or export it.
+
+    Parameters
+    ----------
+    scenario
+        What is shown.
+    picture
+        PNG file for its plan; its path is printed instead of the scenario.
+    export
+        Folder for its TOML, XML and PLY files; likewise.
+    seed
+        Of the roughness in the exported facets.
+    as_json
+        Whether the scenario is printed as JSON, not as TOML.
+    """
+    written = []
+    if picture is not None:
+        written.append(_draw(scenario, picture))
+    if export is not None:
+        written += _export_toml(scenario, export)
+        written += _export_meshes(scenario, export, seed)
+        written = list(dict.fromkeys(written))  # both may have written a table of permittivity
+    if as_json:
+        document = json.loads(scenario.model_dump_json())  # infinity becomes null
+        if written:
+            document = {"files": [str(path) for path in written], "scenario": document}
+        typer.echo(json.dumps(document, indent=2, ensure_ascii=False))
+    elif written:
+        for path in written:
+            typer.echo(path)
+    else:
+        typer.echo(scenario_to_toml(scenario).rstrip())
+
+
+def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:
+    """Write a scenario with the files that it needs, so that the folder can be moved."""
+    moved = relocatable(scenario)
+    contents = {f"{scenario.name}.toml": moved.toml.encode()}
+    contents |= {name: source.read_bytes() for name, source in moved.files.items()}
+    for name, content in contents.items():
+        _write_new(folder / name, content)
+    return [folder / name for name in contents]
+
+
+def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:
+    with stdout_kept_clean():
+        from simulator.export.scene_files import MOST_FROZEN, exported_files, frozen_facets
+
+        if (count := frozen_facets(scenario)) > MOST_FROZEN:
+            typer.echo(
+                f"its {count:.3g} facets are too many to write (limit {MOST_FROZEN:.3g}): the "
+                "smooth scene is exported alone; make objects smaller or less finely rough for "
+                "a frozen one",
+                err=True,
+            )
+        written = []
+        for name, content in exported_files(scenario, seed=seed):
+            _write_new(folder / name, content)
+            written.append(folder / name)
+    return written
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    if path.exists() and path.read_bytes() != content:
+        raise OutputError(
+            f"{path} exists with other content; move it away or choose another folder"
+        )
+    _write(path, content)
+
+
+def _draw(scenario: Scenario, path: Path) -> Path:
+    import io
+
+    from matplotlib.figure import Figure
+
+    with stdout_kept_clean():
+        from mmslam.results.pictures_2d import DOTS_PER_INCH
+        from simulator.scene.scenario_paths import scenario_paths
+        from validation.figures.scenario_plan import draw_scenario
+        from validation.figures.scenario_view import draw_view
+
+        paths = scenario_paths(scenario)
+    figure = Figure(figsize=(14, 6.6), layout="constrained")
+    columns = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
+    draw_scenario(figure.add_subplot(columns[0]), scenario, paths)
+    draw_view(figure.add_subplot(columns[1], projection="3d"), scenario, paths)
+    figure.suptitle(scenario.title or scenario.name)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
+    _write(path, drawn.getvalue())
+    return path
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose another place") from error

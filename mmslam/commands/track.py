@@ -1,0 +1,170 @@
+"""A user that moves, from a dataset whose samples are times to a track in a file and a figure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.measurement.store import read_measurement
+from estimator.results.estimate import Mirror, Progress
+from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
+from mmslam import output
+from mmslam.moving_users import MovingUser, track_store
+from mmslam.results.document import plain, to_json, versions
+from validation.metrics.errors import position_error
+from validation.metrics.truth import read_truth
+
+Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
+"""Where each user truly is at each time; empty where it is not known."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tracked:
+    """What the command has written, and where."""
+
+    folder: Path
+    document: Mapping[str, Any]
+
+
+def track_to_folder(
+    path: Path,
+    *,
+    folder: Path | None,
+    step: float | None,
+    acceleration: float | None,
+    progress: Progress | None = None,
+) -> Tracked:
+    """Locate and track all users of a dataset whose samples are times, and write what was found.
+
+    Parameters
+    ----------
+    path
+        The dataset.
+    folder
+        Is replaced as a whole once all is done; refused before any work if it is foreign.
+        None: ``out/NAME-track``.
+    step
+        Time between samples, before what the file says. [s]
+    acceleration
+        Spectral density, of the motion model; None: that of somebody who walks. [m²/s³]
+    progress
+        Told each sample.
+    """
+    acceleration = ACCELERATION if acceleration is None else acceleration
+    folder = folder or Path("out") / f"{path.stem}-track"
+    output.refuse_to_replace_input(folder, path)
+    with output.replacing(folder, output.refuse_foreign_track) as new:
+        new.mkdir()
+        rooms: list[tuple[Mirror, ...]] = []
+        users = track_store(
+            path,
+            step=step,
+            acceleration=acceleration,
+            progress=progress,
+            located=lambda estimate: rooms.append(estimate.mirrors),
+        )
+        truths = [
+            read_truth(path, sample=sample).user_position for sample in range(len(users[0].times))
+        ]
+        document = track_document(users, truths, acceleration=acceleration)
+        measurement = read_measurement(path, sample=0)
+        measured = measurement.echo or measurement.uplinks[0]
+        # matplotlib's import takes half a second that other commands need not wait.
+        from mmslam.results.pictures_2d import save
+        from mmslam.results.track_figure import track_figure
+
+        figure = track_figure(users, truths, rooms[-1], measured.positions)
+        save(figure, new / output.TRACK_FIGURE)
+        (new / output.TRACK).write_text(to_json(document), encoding="utf-8")
+    return Tracked(folder=folder, document=document)
+
+
+def track_document(
+    users: Sequence[MovingUser], truths: Truths, *, acceleration: float
+) -> Mapping[str, Any]:
+    """Lay out the tracks as one JSON document: SI, null where unknown.
+
+    Parameters
+    ----------
+    users
+        Tracked through the same times.
+    truths
+        Of each time.
+    acceleration
+        Of the motion model. [m²/s³]
+    """
+    return plain(
+        {
+            "format": output.FORMAT,
+            "versions": versions(),
+            "acceleration_m2_s3": acceleration,
+            "tracks": [_track(user, truths) for user in users],
+        }
+    )
+
+
+def track_lines(document: Mapping[str, Any], folder: Path) -> Iterator[str]:
+    """Tell the tracks: a line for each time of each user, and where the files lie."""
+    for one in document["tracks"]:
+        points = {point["time_s"]: point for point in one["points"]}
+        for fix in one["fixes"]:
+            yield f"{one['name']} at {fix['time_s']:.3f} s: {_told(fix, points.get(fix['time_s']))}"
+        if one["rival"] > 0.01:
+            yield (
+                f"{one['name']}: another choice among ambiguous answers is "
+                f"{100 * one['rival']:.0f} % as probable"
+            )
+    yield f"open {folder / output.TRACK_FIGURE}"
+
+
+def _told(fix: Mapping[str, Any], point: Mapping[str, Any] | None) -> str:
+    status = fix["status"].replace("_", " ")
+    if point is None:
+        return f"{status}; before the track begins"
+    place = ", ".join(f"{value:.4f}" for value in point["position_m"])
+    spread = sqrt(sum(point["covariance"][axis][axis] for axis in range(3)))
+    speed = sqrt(sum(value**2 for value in point["velocity_m_s"]))
+    basis = "bridged" if point["candidate"] is None else status
+    if point["candidate"]:
+        basis += f", alternative {point['candidate']} taken"
+    line = f"({place}) m ± {1e3 * spread:.2f} mm, {speed:.2f} m/s ({basis})"
+    if point["error_m"] is not None:
+        line += f"; {1e3 * point['error_m']:.2f} mm from the truth"
+    return line
+
+
+def _track(user: MovingUser, truths: Truths) -> dict[str, Any]:
+    at = {time: truth.get(user.name) for time, truth in zip(user.times, truths, strict=True)}
+    return {
+        "name": user.name,
+        "rival": user.track.rival,
+        "points": [_point(point, at[point.time]) for point in user.track.points],
+        "fixes": [
+            {
+                "time_s": time,
+                "status": answer.status,
+                "reason": answer.reason,
+                "estimate_m": answer.position,
+                "covariance_m2": answer.covariance,
+                "error_m": position_error(answer.position, at[time]),
+                "alternatives_m": [other.position for other in answer.alternatives],
+            }
+            for time, answer in zip(user.times, user.answers, strict=True)
+        ],
+    }
+
+
+def _point(point: TrackPoint, truth: Float[np.ndarray, " 3"] | None) -> dict[str, Any]:
+    return {
+        "time_s": point.time,
+        "position_m": point.position,
+        "velocity_m_s": point.velocity,
+        "covariance": point.covariance,  # of (position [m], velocity [m/s])
+        "candidate": point.candidate,  # 0: the answer, above: an alternative, null: bridged
+        "truth_m": truth,
+        "error_m": position_error(point.position, truth),
+    }

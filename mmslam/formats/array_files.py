@@ -1,0 +1,153 @@
+"""An array by its file and name, whatever the format; nothing but numbers is read."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimator.measurement.model import MeasurementError
+from mmslam.formats.csv_columns import CsvGrid, read_csv_grid
+from mmslam.formats.hdf5_files import hdf5_array, is_hdf5
+from mmslam.formats.matlab_files import matlab_array
+from mmslam.formats.numpy_files import npy_array, npz_arrays
+
+LARGEST = 2**28
+"""Most values of one array: 4 GiB as complex numbers. A file of some bytes can promise more."""
+
+SUFFIXES = {
+    ".mat": "mat",
+    ".h5": "hdf5",
+    ".hdf5": "hdf5",
+    ".he5": "hdf5",
+    ".nc": "netcdf",
+    ".nc4": "netcdf",
+    ".cdf": "netcdf",
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".npz": "npz",
+    ".npy": "npy",
+}
+"""What a file's name says about its format."""
+
+_NETCDF_3 = (b"CDF\x01", b"CDF\x02")
+
+
+class ArrayFiles:
+    """Reads arrays by file and name; a CSV file is read once."""
+
+    def __init__(self, *, frequency: str | None, coordinates: tuple[str, ...]) -> None:
+        """Know the columns that tell a CSV row's frequency and position."""
+        self._frequency = frequency
+        self._coordinates = coordinates
+        self._tables: dict[Path, CsvGrid] = {}
+
+    def array(self, path: Path, name: str | None) -> np.ndarray:
+        """Read an array of numbers.
+
+        Parameters
+        ----------
+        path
+            The file.
+        name
+            The variable, dataset or column; None for an .npy file, which holds one only.
+
+        Raises
+        ------
+        MeasurementError
+            If the file is not what its name says, or holds no such array of finite numbers.
+        """
+        kind = format_of(path)
+        if (name is None) != (kind == "npy"):
+            raise MeasurementError(
+                f"{path}: an .npy file holds one array without a name; leave variable out"
+                if kind == "npy"
+                else f"{path}: which of its arrays? name it by variable in the mapping"
+            )
+        values = npy_array(path) if name is None else self._named(path, kind, name)
+        if values.dtype.kind not in "iufc":
+            raise MeasurementError(
+                f"{path}: {name or 'the array'!r} holds {values.dtype}; only numbers are read"
+            )
+        if values.size == 0:
+            raise MeasurementError(
+                f"{path}: {name or 'the array'!r} is empty (shape {values.shape}); choose another"
+            )
+        bad = np.count_nonzero(~np.isfinite(values))
+        if bad:
+            raise MeasurementError(
+                f"{path}: {bad} of {values.size} values of {name or 'the array'!r} are NaN, "
+                "infinite or missing; measure again, or remove those positions"
+            )
+        return values
+
+    def _named(self, path: Path, kind: str, name: str) -> np.ndarray:
+        match kind:
+            case "csv":
+                if path not in self._tables:
+                    self._tables[path] = read_csv_grid(
+                        path, frequency=self._frequency, coordinates=self._coordinates
+                    )
+                return self._tables[path].array(name)
+            case "npz":
+                return npz_arrays(path, only=name, largest=LARGEST)[name]
+            case "mat":
+                return matlab_array(path, name, largest=LARGEST)
+            case _ if is_hdf5(path):
+                return hdf5_array(path, name, largest=LARGEST)
+            case "netcdf" if _is_netcdf_3(path):
+                return _netcdf_3_array(path, name)
+        raise MeasurementError(
+            f"{path}: not an HDF5{' or NetCDF' if kind == 'netcdf' else ''} file, whatever its "
+            "name says; export it again"
+        )
+
+
+def format_of(path: Path) -> str:
+    """Name the format of a file.
+
+    Raises
+    ------
+    MeasurementError
+        If there is no such file, or its suffix is unknown.
+    """
+    if not path.is_file():
+        raise MeasurementError(f"{path}: no such file; correct its name in the mapping")
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None:
+        raise MeasurementError(
+            f"{path}: unknown suffix {path.suffix!r}; give a folder of Touchstone files, or one "
+            f"of {', '.join(SUFFIXES)}"
+        )
+    return kind
+
+
+def is_csv(path: Path) -> bool:
+    """Tell whether a file's name says that it is a table of text."""
+    return SUFFIXES.get(path.suffix.lower()) == "csv"
+
+
+def _is_netcdf_3(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(4) in _NETCDF_3
+
+
+def _netcdf_3_array(path: Path, name: str) -> np.ndarray:
+    from scipy.io import netcdf_file
+
+    try:
+        with netcdf_file(path, "r", mmap=False, maskandscale=True) as file:
+            if name not in file.variables:
+                found = ", ".join(file.variables) or "none"
+                raise MeasurementError(f"{path}: no variable {name!r} (found: {found}); choose one")
+            values: Any = np.ma.asarray(file.variables[name][:])
+    except MeasurementError:
+        raise
+    except Exception as error:  # SciPy fails in many ways on a damaged file
+        raise MeasurementError(
+            f"{path}: cannot be read as NetCDF ({type(error).__name__}: {error}); it may be "
+            "truncated: copy it again"
+        ) from error
+    if np.ma.is_masked(values):
+        return np.asarray(values.astype(np.float64).filled(np.nan))
+    native = np.asarray(values.data)  # the file is big-endian
+    return native.astype(native.dtype.newbyteorder("="))

@@ -1,0 +1,147 @@
+"""Measured data of any layout becomes a measurement, told by a mapping file what is what.
+
+The order of the steps: read; bring to exp(+jωt); subtract the background; divide the radio's
+response out; take the cables' delay out. The steps are those of
+:mod:`estimator.measurement.calibration`.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from scipy.constants import speed_of_light
+
+from estimator.measurement.calibration import equalise, remove_path, subtract_background
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from mmslam.formats.mapping import EchoTable, SignalTable, SweepMapping
+from mmslam.formats.measured_signals import (
+    ArrayReader,
+    FolderReader,
+    Positions,
+    Signal,
+    SignalReader,
+    told,
+)
+from mmslam.formats.plausibility import sign_note, strength_note
+from mmslam.formats.touchstone_files import SUFFIX
+
+Data = TypeVar("Data", Echo, Uplink)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Import:
+    """A measurement, and what looked odd in the data."""
+
+    measurement: Measurement
+    notes: tuple[str, ...]
+
+
+def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Import:
+    """Read measured data.
+
+    Parameters
+    ----------
+    source
+        A folder of Touchstone files, or an array or CSV file.
+    mapping
+        What in it is what.
+    base
+        Folder to which the mapping's file names are relative.
+
+    Raises
+    ------
+    MeasurementError
+        If something is missing, damaged, inconsistent or implausible; the message names the
+        file, the value, the limit and the remedy.
+    """
+    if not source.exists():
+        raise MeasurementError(f"{source}: no such file or folder")
+    if source.is_file() and SUFFIX.search(source.name):
+        raise MeasurementError(
+            f"{source}: one Touchstone file is one position; give the folder of all of them"
+        )
+    reader: SignalReader = (
+        FolderReader(source, mapping, base)
+        if source.is_dir()
+        else ArrayReader(source, mapping, base)
+    )
+    notes: list[str] = []
+    echo = None
+    if mapping.echo is not None:
+        found = reader.signal("echo", mapping.echo)
+        transmitters = _transmitters(reader, mapping.echo, found)
+        with told(source):
+            raw: Echo = Echo(
+                samples=found.samples,
+                positions=found.positions,
+                frequencies=found.frequencies,
+                transmit_positions=transmitters,
+            )
+        echo = _calibrated(reader, raw, mapping.echo, "echo")
+        notes += _notes(source, "echo", echo, found)
+    uplinks = []
+    for user, table in mapping.uplinks.items():
+        name = f"uplinks.{user}"
+        found = reader.signal(name, table)
+        with told(source):
+            pilot = Uplink(
+                samples=found.samples,
+                positions=found.positions,
+                frequencies=found.frequencies,
+                user=user,
+            )
+        uplinks.append(_calibrated(reader, pilot, table, name))
+        notes += _notes(source, name, uplinks[-1], found)
+    clock = mapping.clock_offset_ns
+    with told(source):
+        measurement = Measurement(
+            echo=echo,
+            uplinks=tuple(uplinks),
+            waves=mapping.waves,
+            boresight=np.array(mapping.boresight),
+            clock_offset=None if clock is None else clock / 1e9,
+            scenario=mapping.scenario or source.resolve().stem,
+        )
+    return Import(measurement=measurement, notes=tuple(dict.fromkeys(notes)))
+
+
+def _transmitters(reader: SignalReader, table: EchoTable, found: Signal) -> Positions | None:
+    if table.transmit_positions is not None:
+        return reader.transmitters(table.transmit_positions, len(found.positions))
+    if table.transmit_offset_m is not None:
+        return np.asarray(found.positions + np.array(table.transmit_offset_m))
+    return found.transmit_positions
+
+
+def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str) -> Data:
+    if table.background is not None:
+        empty = reader.background(name, table, table.background)
+        same = empty.positions.shape == data.positions.shape and len(data.positions) > 1
+        samples, positions = empty.samples, empty.positions
+        if len(samples) == 1 and not same:  # one sweep serves all positions
+            samples = np.broadcast_to(samples, (len(data.positions), samples.shape[1]))
+            positions = data.positions
+        with told(f"{name}.background"):
+            background = replace(
+                data, samples=samples, positions=positions, frequencies=empty.frequencies
+            )
+            data = subtract_background(data, background)
+    if table.response is not None:
+        through = reader.response(name, table, table.response)
+        with told(f"{name}.response"):
+            if not np.array_equal(through.frequencies, data.frequencies):
+                raise MeasurementError(
+                    "its frequencies differ from the measurement's; measure both on one grid"
+                )
+            data = equalise(data, through.samples[0], phase_only=table.response.phase_only)
+    # The delay in air has the same phase: l = τ·c.
+    return remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
+
+
+def _notes(source: Path, name: str, data: Echo | Uplink, found: Signal) -> list[str]:
+    notes = [
+        strength_note(f"{source}: {name}", data.samples),
+        sign_note(f"{source}: {name}", data.samples, data.frequencies),
+    ]
+    return [*found.notes, *(note for note in notes if note is not None)]

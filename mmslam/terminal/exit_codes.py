@@ -1,0 +1,63 @@
+"""What the user did wrong becomes one message and exit code 2; a bug keeps its traceback."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+
+import typer
+
+from mmslam.terminal.interruption import ResumableInterruption, interruptions_noted
+
+FALLS_SHORT = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+@contextlib.contextmanager
+def told_clearly() -> Iterator[None]:
+    """Turn bad input into its message and exit code 2, Ctrl-C into exit code 130."""
+    with interruptions_noted() as interrupted:
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            if interrupted() or isinstance(error, KeyboardInterrupt):
+                resumable = isinstance(error, ResumableInterruption)
+                _say(str(error) if resumable else "interrupted; nothing was written")
+                raise typer.Exit(INTERRUPTED) from None
+            if not isinstance(error, _users_errors()):
+                raise
+            _say(f"error: {error}")
+            raise typer.Exit(BAD_INPUT) from None
+
+
+@contextlib.contextmanager
+def stdout_kept_clean() -> Iterator[None]:
+    """Send to stderr whatever is printed meanwhile, by C++ libraries too.
+
+    Mitsuba and LLVM write to the file descriptor, which no replacement of ``sys.stdout``
+    reaches.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _say(message: str) -> None:
+    typer.echo(f"mmslam: {message}", err=True)
+
+
+def _users_errors() -> tuple[type[Exception], ...]:
+    # Imported here: only a failure pays for pydantic and jaxtyping.
+    from estimator.compute.engine import EngineError
+    from estimator.measurement.model import MeasurementError
+    from mmslam.output import OutputError
+    from scenes.scenario import ScenarioError
+
+    return EngineError, MeasurementError, OutputError, ScenarioError
