@@ -24,10 +24,11 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from scenes.scenario import parse_scenario
+from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets
 from simulator.geometry.ray_scene import CLEARANCE, facets_visible
 from simulator.response.single_bounce_3d import scattered_in_space
-from simulator.scattering.physical_optics import Ports, facet_transform, isotropic, scattered
+from simulator.scattering.physical_optics import facet_transform, scattered
 from simulator.scene.array_antennas import array_sight
 from simulator.scene.radio_scene import RadioScene, radio_scene
 

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from scenes.checks.facet_budget import facet_problems
 from scenes.checks.files import file_problems
 from scenes.checks.multistatic import antenna_places, multistatic_problems
 from scenes.checks.placement import inconsistencies
@@ -23,11 +24,12 @@ from scenes.schema.errors import ScenarioError, did_you_mean, problems
 from scenes.schema.impairments import Impairments
 from scenes.schema.materials import MATERIALS, Slab
 from scenes.schema.multistatic import Arc, Places, Transmitter
-from scenes.schema.objects import Box, Cylinder, MeshFile, Plate, Roughness, SceneObject
+from scenes.schema.objects import Box, Cylinder, MeshFile, Plate, SceneObject
 from scenes.schema.point_target import PointTarget
 from scenes.schema.quantities import Checked, Name, Position
 from scenes.schema.radio import Radio
-from scenes.surfaces.facet_spacing import facet_problems, facet_spacing
+from scenes.schema.roughness import Roughness
+from scenes.surfaces.facet_spacing import facet_spacing
 
 __all__ = [
     "MATERIALS",

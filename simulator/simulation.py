@@ -7,12 +7,12 @@ import xarray as xr
 
 from estimator.measurement.model import Echo, Measurement, Uplink
 from scenes.scenario import Scenario
+from simulator.antennas.ports import Ports
 from simulator.receiver.receiver import received
 from simulator.response.echo import simulate_echo
 from simulator.response.multistatic import multistatic_echo, multistatic_scene
 from simulator.response.point_targets import point_echo, point_uplink
 from simulator.response.uplink import simulate_uplink
-from simulator.scattering.physical_optics import Ports
 from simulator.scene.array_antennas import in_space
 from simulator.scene.radio_scene import facet_ports, radio_scene
 from simulator.scene.truth import scenario_truth

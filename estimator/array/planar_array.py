@@ -8,8 +8,8 @@ from scipy.constants import speed_of_light
 
 from estimator.array.array_frame import ArrayFrame
 from estimator.array.resolution import unaliased_sine
+from estimator.array.resolution_cell import Resolution
 from estimator.measurement.model import Echo, MeasurementError, Uplink, frequency_step
-from estimator.walls.line_detection import Resolution
 
 FLATNESS = 1e-4
 """Largest distance of a phase centre from the array's plane, as for the line of a linear

@@ -152,7 +152,7 @@ def _taylor(
 
 SURVEY_TAPER = Window(name="taylor", sidelobe_db=-50.0, nearly_equal=9)
 """Over the aperture and the band where everything is looked at: its sidelobes are below
-:data:`estimator.walls.line_detection.DYNAMIC_RANGE`."""
+:data:`estimator.imaging.peak_detection.DYNAMIC_RANGE`."""
 
 
 def survey_weights(measured: Echo | Uplink) -> Float[np.ndarray, "positions freqs"]:

@@ -15,7 +15,7 @@ from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.measurement.model import Uplink
 from estimator.results.estimate import AngleRangeMap
 from estimator.wavefronts.curvature_search_2d import search_curvature
-from estimator.wavefronts.phase_error import noise_variance
+from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.wave_fit_2d import (
     FittedWaves,
     SphericalWave,

@@ -16,7 +16,7 @@ from estimator.imaging.range_gating import gated
 from estimator.measurement.model import Uplink
 from estimator.results.estimate import DirectionMap
 from estimator.wavefronts.curvature_search_3d import WavefrontStart, search_wavefront
-from estimator.wavefronts.phase_error import noise_variance
+from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront, wavefront_field
 
 MOST_PATHS = 4

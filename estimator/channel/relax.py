@@ -25,8 +25,8 @@ from estimator.channel.angle_range_map_2d import (
     default_path_lengths,
     polar_points,
 )
+from estimator.imaging.peak_detection import mean_background
 from estimator.measurement.model import MeasurementError, Uplink
-from estimator.walls.line_detection import mean_background
 from estimator.wavefronts.wave_fit_2d import (
     FittedWaves,
     WaveStart,

@@ -1,7 +1,7 @@
 """How well a predicted path is known: from the covariances of the user's position and the walls.
 
 Inputs are the user's x and y, then each wall's angle and offset, as
-:class:`estimator.geometry.path_tracing_2d.Wall` counts them; to first order.
+:class:`estimator.geometry.wall_2d.Wall` counts them; to first order.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
 from estimator.geometry.specular_chains_2d import Chain, image_over
+from estimator.geometry.wall_2d import Wall, mirrored
 
 STEP = 1e-6
 """Of the central differences; as far from rounding as from the curvature. [m], [rad]."""

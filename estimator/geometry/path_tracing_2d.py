@@ -6,39 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from estimator.geometry.wall_2d import Wall, crossing, mirrored
+
 MOST_BOUNCES = 8
 GRAZING = 1e-9
 """Least distance from one bounce to the next. [m]."""
-
-
-def unit_normal(
-    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
-) -> Float[np.ndarray, " 3"]:
-    """Return a line's unit normal: its direction turned by -90 degrees in the array's plane."""
-    along = (end - start) / np.linalg.norm(end - start)
-    return np.array([along[1], -along[0], 0.0])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wall:
-    """A flat mirror in the array's plane, with what is known of its line."""
-
-    start: Float[np.ndarray, " 3"]  # [m]
-    end: Float[np.ndarray, " 3"]  # [m]
-    covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
-
-    @property
-    def normal(self) -> Float[np.ndarray, " 3"]:
-        """Unit normal, to the right of start to end."""
-        return unit_normal(self.start, self.end)
-
-    def moved(self, *, tilt: float, offset: float) -> "Wall":
-        """Turn the wall about its midpoint (counter-clockwise) and move it along its normal."""
-        middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
-        cosine, sine = np.cos(tilt), np.sin(tilt)
-        turned = np.array([cosine * half[0] - sine * half[1], sine * half[0] + cosine * half[1], 0])
-        middle = middle + offset * unit_normal(middle - turned, middle + turned)
-        return Wall(start=middle - turned, end=middle + turned, covariance=self.covariance)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,17 +22,6 @@ class Projection:
     walls: tuple[int, ...]  # met on the way, from the array outward
     path: Float[np.ndarray, "vertices 3"]  # array, bounces, user [m]
     margin: float  # least distance of a bounce from an end of its wall; inf without [m]
-
-
-def mirrored(
-    points: Float[np.ndarray, "*n 3"],
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-) -> Float[np.ndarray, "*n 3"]:
-    """Mirror points about the line through two points of the array's plane. [m]."""
-    normal = unit_normal(start, end)
-    images: np.ndarray = points - 2 * ((points - start) @ normal)[..., None] * normal
-    return images
 
 
 def project(
@@ -156,27 +117,3 @@ def _follow(
 
 def _reflected(direction: Float[np.ndarray, " 3"], wall: Wall) -> Float[np.ndarray, " 3"]:
     return mirrored(direction, np.zeros(3), wall.end - wall.start)
-
-
-def crossing(
-    origin: Float[np.ndarray, " 3"],
-    direction: Float[np.ndarray, " 3"],
-    start: Float[np.ndarray, " 3"],
-    end: Float[np.ndarray, " 3"],
-) -> tuple[float, float] | None:
-    """Intersect a ray with a segment in the plane z = 0.
-
-    Returns
-    -------
-    The distance along the ray and the distance to the nearer end of the segment [m]; or
-    ``None`` if they do not meet.
-    """
-    along = end - start
-    length = float(np.linalg.norm(along))
-    system = np.stack([direction[:2], -along[:2]], axis=-1)
-    if abs(np.linalg.det(system)) < 1e-12 * length:
-        return None
-    distance, share = np.linalg.solve(system, (start - origin)[:2])
-    if distance <= 0 or not 0 <= share <= 1:
-        return None
-    return float(distance), length * float(min(share, 1 - share))

@@ -4,42 +4,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
+
+from estimator.geometry.wall_3d import PlaneWall, mirrored_about, within
 
 MOST_BOUNCES = 8
 GRAZING = 1e-9
 """Least distance from one bounce to the next. [m]."""
 STEP = 1e-6
 """Step of the numerical derivatives: in metres, cosines and slopes alike."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlaneWall:
-    """A flat mirror in space: a convex polygon, with what is known of its plane."""
-
-    corners: Float[np.ndarray, "corners 3"]  # in order around it, in its plane [m]
-    centre: Float[np.ndarray, " 3"]  # where the covariance is counted from [m]
-    axes: Float[np.ndarray, "2 3"]  # unit vectors in the plane
-    covariance: Float[np.ndarray, "3 3"]  # of (tilt along each axis [rad], offset [m])
-
-    @property
-    def normal(self) -> Float[np.ndarray, " 3"]:
-        """Unit vector across, the first axis cross the second."""
-        return np.cross(self.axes[0], self.axes[1])
-
-    def moved(self, change: Float[np.ndarray, " 3"]) -> "PlaneWall":
-        """Tilt the plane about its centre, so that it rises by a slope, and offset it."""
-        normal = self.normal
-        rise = (self.corners - self.centre) @ (self.axes.T @ change[:2]) + change[2]
-        tilted = self.axes + change[:2, None] * normal
-        first = tilted[0] / np.linalg.norm(tilted[0])
-        second = tilted[1] - (tilted[1] @ first) * first
-        return PlaneWall(
-            corners=self.corners + rise[:, None] * normal,
-            centre=self.centre + change[2] * normal,
-            axes=np.stack([first, second / np.linalg.norm(second)]),
-            covariance=self.covariance,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,14 +23,6 @@ class SpaceProjection:
     covariance: Float[np.ndarray, "3 3"]  # [m²]
     walls: tuple[int, ...]  # met on the way, from the array outward
     path: Float[np.ndarray, "vertices 3"]  # array, bounces, user [m]
-
-
-def mirrored_about(points: Float[np.ndarray, "*n 3"], wall: PlaneWall) -> Float[np.ndarray, "*n 3"]:
-    """Mirror points about a wall's plane. [m]."""
-    normal = wall.normal
-    height = np.einsum("...x,x->...", points - wall.centre, normal)
-    images: np.ndarray = points - 2 * height[..., None] * normal
-    return images
 
 
 def folded_over(
@@ -98,38 +63,6 @@ def slopes_by_wall(
         return value([*walls[:index], walls[index].moved(change), *walls[index + 1 :]])
 
     return central_slopes(moved)
-
-
-def within(
-    points: Float[np.ndarray, "n 3"], wall: PlaneWall, *, margin: float = 0.0
-) -> Bool[np.ndarray, " n"]:
-    """Tell which points of a wall's plane lie in its polygon, widened by a margin [m]."""
-    corners = (wall.corners - wall.centre) @ wall.axes.T
-    places = (points - wall.centre) @ wall.axes.T
-    edges = np.roll(corners, -1, axis=0) - corners
-    turn = np.sign(
-        np.sum(
-            corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)
-        )
-    )
-    inward = turn * np.stack([-edges[:, 1], edges[:, 0]], axis=-1)
-    inward = inward / np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-12)
-    depth = np.einsum("nex,ex->ne", places[:, None, :] - corners, inward)
-    inside: np.ndarray = np.all(depth >= -margin, axis=1)
-    return inside
-
-
-def hidden_by(
-    points: Float[np.ndarray, "n 3"], wall: PlaneWall, *, margin: float = 0.0
-) -> Bool[np.ndarray, " n"]:
-    """Tell which points the array, at the origin, sees through a wall."""
-    normal = wall.normal
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (wall.centre @ normal) / (points @ normal)
-    crossed = (share > 0) & (share < 1)
-    hidden = np.zeros(len(points), dtype=bool)
-    hidden[crossed] = within(share[crossed, None] * points[crossed], wall, margin=margin)
-    return hidden
 
 
 def project_in_space(

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored, unit_normal
+from estimator.geometry.wall_2d import Wall, mirrored, unit_normal
 
 DEEPEST = 4
 """Longest chain of mirrors that is unfolded."""

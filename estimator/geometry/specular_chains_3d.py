@@ -10,7 +10,8 @@ from itertools import pairwise, product
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from estimator.geometry.path_tracing_3d import GRAZING, PlaneWall, folded_over, within
+from estimator.geometry.path_tracing_3d import GRAZING, folded_over
+from estimator.geometry.wall_3d import PlaneWall, within
 
 Chain = tuple[int, ...]
 """Indices of walls, from the array outward."""

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
+from estimator.array.resolution_cell import Resolution
 from estimator.imaging.range_compression import RangeProfiles
-from estimator.walls.line_detection import Resolution
 
 BENDS = np.linspace(0.0, 24.0, 13)
 """Excess phases at the ends of the aperture that are tried. [rad]."""

@@ -16,13 +16,13 @@ from scipy.constants import speed_of_light
 from estimator.array.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
-from estimator.measurement.model import Echo
-from estimator.walls.line_detection import (
+from estimator.imaging.peak_detection import (
     DYNAMIC_RANGE,
     FALSE_ALARM,
     image_contrast,
     mean_background,
 )
+from estimator.measurement.model import Echo
 
 STEP = 0.75
 """Spacing of the grid, over the untapered cell: 0.44 of the tapered one. [-]"""

@@ -7,8 +7,10 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from estimator.array.array_frame import ArrayFrame, array_frame
+from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
 from estimator.array.planar_array import spans_a_plane
 from estimator.array.resolution import largest_spacing
+from estimator.array.resolution_cell import Resolution
 from estimator.channel.angle_range_map_2d import (
     angle_range_map,
     default_angles,
@@ -22,8 +24,6 @@ from estimator.measurement.model import Echo, Measurement, Uplink, frequency_ste
 from estimator.positioning.diffuse_fallback import with_diffuse_search
 from estimator.positioning.position_decision_2d import decide
 from estimator.results.estimate import AngleRangeMap, Estimate, Progress, UserEstimate
-from estimator.walls.line_detection import Resolution
-from estimator.walls.wall_detection_2d import echo_reach, echo_resolution, imaged_sine
 
 NO_IMAGE = Resolution(along_ray=0.0, across_ray=0.0)
 CLOSE_UP = 80

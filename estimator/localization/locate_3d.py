@@ -11,6 +11,7 @@ from scipy.constants import speed_of_light
 from estimator.array.array_frame import ArrayFrame
 from estimator.array.planar_array import planar_array, planar_frame, planar_resolution
 from estimator.array.resolution import largest_spacing
+from estimator.array.resolution_cell import Resolution
 from estimator.channel.angle_range_map_3d import direction_map
 from estimator.channel.path_extraction_3d import LEAST_SHARE, find_space_paths
 from estimator.mapping.map_3d import SpaceMap, build_space_map, corrected_values
@@ -18,7 +19,6 @@ from estimator.measurement.model import Measurement, MeasurementError, Uplink, f
 from estimator.positioning.position_decision_3d import decide_in_space
 from estimator.results.estimate import Estimate, Image, Mirror, Progress, Target, UserEstimate
 from estimator.results.pixel_grid import PixelGrid
-from estimator.walls.line_detection import Resolution
 
 VOXELS = 1_500_000
 """Most voxels of an image; its spacing grows beyond."""

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.array.resolution_cell import Resolution
+from estimator.walls.fitted_line import FittedLine
 
 FACETS = 48
 """Places along a wall, the straight way included."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from estimator.geometry.path_tracing_2d import Wall
 from estimator.geometry.specular_chains_2d import Chain, image_over, possible_chains, seen_over
-from estimator.walls.line_sampling import Focus
+from estimator.geometry.wall_2d import Wall
+from estimator.imaging.focusing import Focus
 
 
 @dataclass(frozen=True, kw_only=True)

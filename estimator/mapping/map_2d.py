@@ -6,20 +6,16 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.array.array_frame import ArrayFrame
-from estimator.geometry.path_tracing_2d import Wall
+from estimator.array.linear_array import echo_resolution
+from estimator.geometry.wall_2d import Wall
+from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.target_detection import find_targets
 from estimator.mapping.wall_unfolding import fold_seen_lines
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
-from estimator.walls.wall_detection_2d import (
-    Survey,
-    detect_mirrors,
-    echo_resolution,
-    loose_peaks,
-    survey,
-)
+from estimator.walls.wall_detection_2d import detect_mirrors, loose_peaks
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,8 @@ from jaxtyping import Complex, Float
 from scipy.spatial import cKDTree
 
 from estimator.array.planar_array import PlanarArray, planar_resolution
-from estimator.geometry.path_tracing_3d import PlaneWall, folded_over, hidden_by, mirrored_about
+from estimator.array.resolution_cell import Resolution, coarse_resolution
+from estimator.geometry.path_tracing_3d import folded_over
 from estimator.geometry.specular_chains_3d import (
     Chain,
     chains_in_space,
@@ -17,9 +18,10 @@ from estimator.geometry.specular_chains_3d import (
     seen_over_in_space,
     unfolded_in_space,
 )
+from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
+from estimator.imaging.peak_detection import FALSE_ALARM
 from estimator.imaging.survey_3d import VolumeSurvey, survey_volume
 from estimator.measurement.model import Echo
-from estimator.walls.line_detection import FALSE_ALARM, Resolution, coarse_resolution
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.array.array_frame import ArrayFrame
+from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
 from estimator.imaging.backprojection import focus, prepare
 from estimator.imaging.range_compression import range_profiles
 from estimator.mapping.ghost_correction import corrected_image
@@ -13,7 +14,6 @@ from estimator.mapping.map_2d import RoomMap
 from estimator.measurement.model import Echo
 from estimator.results.estimate import CorrectedImage, Image
 from estimator.results.pixel_grid import PixelGrid
-from estimator.walls.wall_detection_2d import echo_reach, echo_resolution, imaged_sine
 
 PIXELS = 2_000_000
 """Most pixels of an image that is shown; its spacing grows beyond."""

@@ -8,16 +8,17 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import label
 
 from estimator.array.resolution import HALF_POWER
+from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER
-from estimator.geometry.path_tracing_2d import Wall, crossing, mirrored, unit_normal
 from estimator.geometry.specular_chains_2d import image_over, possible_chains, seen_over, unfolded
+from estimator.geometry.wall_2d import Wall, crossing, mirrored, unit_normal
+from estimator.imaging.peak_detection import mean_background
+from estimator.imaging.survey_2d import Survey
 from estimator.mapping.diffuse_multipath import between, in_cloud
 from estimator.mapping.wall_unfolding import FoldedWalls, place_covariance
 from estimator.results.estimate import Target
-from estimator.walls.line_detection import Resolution, coarse_resolution, mean_background
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_relations import lies_on
-from estimator.walls.wall_detection_2d import Survey
 
 LEAST_COHERENCE = 0.3
 """Of a target over the aperture: with a cloud as strong as itself in its own range it has 0.5;

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import Wall, crossing, mirrored
+from estimator.array.resolution_cell import Resolution
 from estimator.geometry.specular_chains_2d import DEEPEST, Chain, unfolded
+from estimator.geometry.wall_2d import Wall, crossing, mirrored
 from estimator.mapping.diffuse_multipath import between
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 
 SAMPLES = 9
 """Places along a line at which it is asked what stands before them."""

@@ -8,11 +8,12 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored, project
+from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_positioning import DiffuseFix, SeenWall, search_diffuse
 from estimator.results.estimate import UserEstimate
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 
 MOST_ENERGY = 0.5
 """Share of the pilot's energy from which paths are not given up for what a wall scatters. [-]"""

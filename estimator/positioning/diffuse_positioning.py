@@ -31,7 +31,7 @@ from scipy.constants import speed_of_light
 from scipy.ndimage import map_coordinates, maximum_filter1d, spline_filter
 
 from estimator.array.windows import survey_weights
-from estimator.geometry.path_tracing_2d import Wall
+from estimator.geometry.wall_2d import Wall
 from estimator.measurement.model import Uplink
 
 SIDELOBES = 10**-4.5

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import Wall, crossing, project, unit_normal
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.wall_2d import Wall, crossing, unit_normal
 from estimator.positioning.map_context import Surroundings
 from estimator.results.estimate import UserEstimate
-from estimator.walls.line_detection import Resolution
 from estimator.wavefronts.wave_fit_2d import SphericalWave
 
 LOOSE_PEAKS = 12

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import Wall
-from estimator.walls.line_detection import Resolution
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import Wall
 
 
 @dataclass(frozen=True, kw_only=True)

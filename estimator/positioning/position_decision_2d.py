@@ -15,8 +15,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from estimator.array.resolution_cell import Resolution
 from estimator.channel.path_extraction_2d import Path, PathSet
-from estimator.geometry.path_tracing_2d import Wall, mirrored, project
+from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.positioning.los_check import doubt_straight_way
 from estimator.positioning.map_context import Surroundings
 from estimator.positioning.weighted_least_squares import (
@@ -26,7 +28,6 @@ from estimator.positioning.weighted_least_squares import (
     solve_position,
 )
 from estimator.results.estimate import PathReport, UserEstimate
-from estimator.walls.line_detection import Resolution
 
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""

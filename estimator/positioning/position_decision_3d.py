@@ -7,7 +7,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from estimator.channel.path_extraction_3d import SpacePath
-from estimator.geometry.path_tracing_3d import PlaneWall, SpaceProjection, project_in_space
+from estimator.geometry.path_tracing_3d import SpaceProjection, project_in_space
+from estimator.geometry.wall_3d import PlaneWall
 from estimator.positioning.los_check import hides_walls, too_noisy
 from estimator.results.estimate import UserEstimate
 

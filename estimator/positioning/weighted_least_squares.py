@@ -19,7 +19,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.geometry.wall_2d import Wall, mirrored
 
 ROUNDS = 2
 """How often the walls' part of the covariance is taken at the place found. [-]."""

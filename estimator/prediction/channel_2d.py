@@ -26,8 +26,8 @@ from estimator.geometry.path_covariance import (
     polar_slopes,
     rests_on,
 )
-from estimator.geometry.path_tracing_2d import Wall, crossing, mirrored
 from estimator.geometry.specular_chains_2d import Chain, image_over, possible_chains
+from estimator.geometry.wall_2d import Wall, crossing, mirrored
 from estimator.prediction.wall_reflection import Reflections, wall_reflections
 from estimator.results.estimate import Estimate, Target, UserEstimate
 

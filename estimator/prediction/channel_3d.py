@@ -16,18 +16,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_3d import (
-    PlaneWall,
-    central_slopes,
-    project_in_space,
-    slopes_by_wall,
-)
+from estimator.geometry.path_tracing_3d import central_slopes, project_in_space, slopes_by_wall
 from estimator.geometry.specular_chains_3d import (
     Chain,
     chains_in_space,
     image_in_space,
     unfolded_in_space,
 )
+from estimator.geometry.wall_3d import PlaneWall
 from estimator.prediction.wall_reflection import Reflections, wall_reflections
 
 MOST_BOUNCES = 3

@@ -9,19 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import maximum_filter
 
-from estimator.array.resolution import HALF_POWER
-from estimator.array.windows import SURVEY_TAPER
-
-FALSE_ALARM = 1e-6
-"""Probability that a pixel of pure background counts as significant. [-]."""
-
-DYNAMIC_RANGE = 3e-5
-"""Intensity below the image's peak that may be a sidelobe of it (−45 dB). [-]."""
-
-MOST_PEAKS = 400
-"""Strongest peaks searched: the search is over all their pairs."""
+from estimator.array.resolution_cell import Resolution
+from estimator.imaging.peak_detection import MOST_PEAKS
 
 FEWEST_INLIERS = 5
 """Peaks that make a line. Of n ≤ 400 peaks thrown at random over an area of hundreds of cells
@@ -33,74 +23,12 @@ probability below 1e-3 for each cell. [cells]"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resolution:
-    """Resolution of an aperture at a point: fine along the ray, coarse across it."""
-
-    along_ray: float  # [m]
-    across_ray: float  # per metre of range: an angle [rad]
-
-    def cell(
-        self, points: Float[np.ndarray, "*n 3"], direction: Float[np.ndarray, " 3"]
-    ) -> Float[np.ndarray, "*n"]:
-        """Width of the resolution cell along a direction, for an array at the origin. [m]."""
-        reach = np.linalg.norm(points, axis=-1)
-        radial = np.abs(points @ direction) / reach
-        crossing = np.sqrt(np.clip(1 - radial**2, 0.0, None))
-        width = 1 / np.hypot(radial / self.along_ray, crossing / (self.across_ray * reach))
-        return np.asarray(width)
-
-
-def coarse_resolution(fine: Resolution) -> Resolution:
-    """Return the resolution of the survey, which its taper widens."""
-    wider = SURVEY_TAPER.half_power_width / HALF_POWER
-    return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)
-
-
-@dataclass(frozen=True, kw_only=True)
 class LineCandidate:
     """A segment that many peaks lie on."""
 
     start: Float[np.ndarray, " 3"]  # [m]
     end: Float[np.ndarray, " 3"]  # [m]
     inliers: int
-
-
-def significant_peaks(
-    intensity: Float[np.ndarray, "rows columns"], points: Float[np.ndarray, "rows columns 3"]
-) -> Float[np.ndarray, "peaks 3"]:
-    """Return the local maxima that stand out of the background, strongest first.
-
-    Parameters
-    ----------
-    intensity
-        Squared magnitude of an image that is sampled at about half its resolution.
-    points
-        Its pixels. [m]
-
-    Returns
-    -------
-    Where the peaks are [m]; the background is taken to be exponentially distributed, with
-    the image's median.
-    """
-    background = mean_background(intensity)
-    threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
-    rows, columns = np.nonzero(
-        (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
-    )
-    order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
-    return points[rows[order], columns[order]]
-
-
-def mean_background(intensity: Float[np.ndarray, "*n"]) -> float:
-    """Return the mean of an exponentially distributed background with this median."""
-    return float(np.median(intensity)) / float(np.log(2))
-
-
-def image_contrast(brightest: float, background: float) -> float:
-    """Return the intensity of an image's brightest point over its background; 0 of no image."""
-    if brightest == 0:
-        return 0.0
-    return brightest / background if background > 0 else np.inf
 
 
 def find_lines(

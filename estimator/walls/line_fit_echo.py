@@ -31,7 +31,7 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import zherk
 
-from estimator.geometry.path_tracing_2d import unit_normal
+from estimator.geometry.wall_2d import unit_normal
 from estimator.measurement.model import Echo, frequency_step
 from estimator.walls.cluster_robust_covariance import clustered_covariance
 from estimator.walls.dirichlet_kernel import Sweep, point_profiles

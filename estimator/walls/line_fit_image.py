@@ -23,17 +23,15 @@ The summit is that of a paraboloid fitted over most of a cell. The covariance co
 unevenly the parts of the wall push the line.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaincc
 
-from estimator.geometry.path_tracing_2d import unit_normal
-from estimator.walls.line_detection import Resolution
+from estimator.array.resolution_cell import Resolution
+from estimator.imaging.focusing import Focus
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_extent import lit_extent
 from estimator.walls.line_sampling import (
-    Focus,
     cell_across,
     cell_along,
     levels,
@@ -74,40 +72,6 @@ FEWEST_PLACES = 4
 """Places along a line that still have modes of a higher order than its tilt."""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FittedLine:
-    """A segment in the array's frame, with the statistics of its angle and offset."""
-
-    start: Float[np.ndarray, " 3"]  # [m]
-    end: Float[np.ndarray, " 3"]  # [m]
-    covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
-    level: float  # mean intensity along it [-]
-    background: float  # mean intensity beside it [-]
-    confidence: float  # one minus the probability that background alone does this
-
-    @property
-    def middle(self) -> Float[np.ndarray, " 3"]:
-        """Midpoint. [m]."""
-        middle: np.ndarray = 0.5 * (self.start + self.end)
-        return middle
-
-    @property
-    def normal(self) -> Float[np.ndarray, " 3"]:
-        """Unit normal, to the right of start to end."""
-        return unit_normal(self.start, self.end)
-
-    @property
-    def length(self) -> float:
-        """Length. [m]."""
-        return float(np.linalg.norm(self.end - self.start))
-
-    @property
-    def direction(self) -> Float[np.ndarray, " 3"]:
-        """Unit vector from start to end."""
-        direction: np.ndarray = (self.end - self.start) / self.length
-        return direction
 
 
 def fit_line(

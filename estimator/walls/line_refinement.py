@@ -6,21 +6,17 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from estimator.array.linear_array import echo_reach, echo_resolution
+from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import prepare
+from estimator.imaging.focusing import Focus, focus_within
 from estimator.imaging.range_compression import range_profiles
+from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
-from estimator.walls.line_detection import Resolution, coarse_resolution
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_fit_echo import CoherentLine, fit_coherently
-from estimator.walls.line_fit_image import FittedLine
 from estimator.walls.line_relations import lies_on
-from estimator.walls.line_sampling import Focus
-from estimator.walls.wall_detection_2d import (
-    Survey,
-    echo_reach,
-    echo_resolution,
-    focus_within,
-)
 
 DISAGREEMENT = 6.0
 """Square of what image and echo differ by, over both covariances, beyond which neither is right

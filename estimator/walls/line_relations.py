@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import crossing, mirrored
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import crossing, mirrored
+from estimator.walls.fitted_line import FittedLine
 
 EDGE_DEVIATIONS = 3.0
 """Deviations of its angle by which a wall must miss the array to show it one face. [-]"""

@@ -1,15 +1,12 @@
 """Samples of an image along trial lines, and the brightness there and beside."""
 
-from collections.abc import Callable
-
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import unit_normal
-from estimator.walls.line_detection import Resolution, mean_background
-
-Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
-"""Focuses the echo on points."""
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import unit_normal
+from estimator.imaging.focusing import Focus
+from estimator.imaging.peak_detection import mean_background
 
 SAMPLES_PER_CELL = 2
 """Along the line. [-]"""

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
-from estimator.walls.line_detection import Resolution
+from estimator.array.resolution_cell import Resolution
 
 DRAWS = 6000
 """Planes drawn in each round: one that a tenth of the peaks lie on is drawn six times."""

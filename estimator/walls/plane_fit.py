@@ -20,9 +20,10 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 from scipy.special import gammaincc
 
-from estimator.geometry.path_tracing_3d import PlaneWall, within
-from estimator.walls.line_detection import DYNAMIC_RANGE, Resolution, mean_background
-from estimator.walls.line_sampling import Focus
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_3d import PlaneWall, within
+from estimator.imaging.focusing import Focus
+from estimator.imaging.peak_detection import DYNAMIC_RANGE, mean_background
 
 SUMMIT = 0.6
 """Half the width over which a parabola is fitted. [cells]"""

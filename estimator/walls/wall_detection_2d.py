@@ -1,30 +1,24 @@
 """Mirrors: the walls that an image shows, found without help."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
-from scipy.constants import speed_of_light
+from jaxtyping import Float
 
-from estimator.array.resolution import unaliased_sine
-from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
-from estimator.geometry.path_tracing_2d import crossing
-from estimator.imaging.backprojection import Focuser, backproject, focus, prepare
-from estimator.imaging.phase_curvature import bent_intensities, coherence
+from estimator.array.linear_array import echo_reach, echo_resolution
+from estimator.array.resolution_cell import Resolution, coarse_resolution
+from estimator.array.windows import survey_weights
+from estimator.geometry.wall_2d import crossing
+from estimator.imaging.backprojection import prepare
+from estimator.imaging.focusing import Focus, focus_within
 from estimator.imaging.range_compression import range_profiles
-from estimator.measurement.model import Echo, MeasurementError, frequency_step
-from estimator.walls.face_ends import face_ends
-from estimator.walls.line_detection import (
-    LineCandidate,
-    Resolution,
-    coarse_resolution,
-    find_lines,
-    image_contrast,
-    mean_background,
-    significant_peaks,
-)
-from estimator.walls.line_fit_image import FittedLine, fit_between, fit_line
+from estimator.imaging.survey_2d import REFLECTED, Survey
+from estimator.measurement.model import Echo
+from estimator.walls.fitted_line import FittedLine
+from estimator.walls.line_detection import LineCandidate, find_lines
+from estimator.walls.line_extent import face_ends
+from estimator.walls.line_fit_image import fit_between, fit_line
 from estimator.walls.line_relations import (
     hides,
     is_edge_on,
@@ -33,16 +27,7 @@ from estimator.walls.line_relations import (
     overlap,
     seen_twice,
 )
-from estimator.walls.line_sampling import Focus
 
-REFLECTED = 0.5
-"""Coherence, as that of a mirror facing the array, of what does reflect it. [-]"""
-FACE = 1e-2
-"""Intensity of a facing surface's peaks over that of its reflection. [-]"""
-MOST_GAIN = 1.2
-"""Intensity that a bend of the wavefront may add to a peak; on full-wave data with two ghosts
-and their clouds it adds less than 1 % to each of the wall's peaks, less than 5 % to the ghosts,
-and more than 12 % to three quarters of the clouds', 60 % in the median. [-]"""
 LEAST_COHERENCE = 0.02
 """Coherence of a peak that is one wave at all: sidelobes and the remains of what is nearer than
 the array is long have 1/M of M channels, speckle in a cell with twenty more has 0.05. [-]"""
@@ -63,120 +48,6 @@ LEAST_CONTRAST = 10.0
 LEAST_CONFIDENCE = 0.999
 LEAST_CELLS = 8.0
 """Shortest mirror; shorter ones have no angle to speak of. [cells]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Survey:
-    """A tapered image on a polar grid, uniform in range and in the sine of the azimuth."""
-
-    values: Complex[np.ndarray, "ranges sines"]
-    points: Float[np.ndarray, "ranges sines 3"]  # in the array's frame [m]
-    peaks: Float[np.ndarray, "peaks 3"]  # that stand out of the background, strongest first [m]
-    bent: Bool[np.ndarray, " peaks"]  # whether they were scattered twice: seen nowhere
-    as_point: Float[np.ndarray, " peaks"]  # coherence over the aperture, as that of a point [-]
-    as_mirror: Float[np.ndarray, " peaks"]  # the same as that of a mirror facing the array [-]
-    background: float  # mean intensity of what is no echo [-]
-
-    @property
-    def contrast(self) -> float:
-        """Intensity of the brightest over the background; 0 of no echo. [-]."""
-        return image_contrast(float(np.max(np.abs(self.values) ** 2)), self.background)
-
-
-def echo_resolution(echo: Echo) -> Resolution:
-    """Return c/2B along the ray and λ/2D across it, of an echo in the array's frame."""
-    band = float(echo.frequencies[-1] - echo.frequencies[0])
-    wavelength = speed_of_light / float(echo.frequencies.mean())
-    aperture = float(np.ptp(echo.positions[:, 0]))
-    return Resolution(along_ray=speed_of_light / (2 * band), across_ray=wavelength / (2 * aperture))
-
-
-def echo_reach(echo: Echo) -> tuple[float, float]:
-    """Return the distances between which an echo can be imaged. [m].
-
-    From half the aperture to the unambiguous range c/2Δf, less the aperture.
-
-    Raises
-    ------
-    MeasurementError
-        If nothing is left between.
-    """
-    aperture = float(np.ptp(echo.positions[:, 0]))
-    step = frequency_step(echo.frequencies)
-    nearest, farthest = 0.5 * aperture, speed_of_light / (2 * step) - 1.1 * aperture
-    if farthest < 2 * nearest:
-        raise MeasurementError(
-            f"frequency step {step / 1e6:.4g} MHz: the echo is unambiguous to "
-            f"{speed_of_light / (2 * step):.3g} m only, less than twice the aperture of "
-            f"{aperture:.3g} m; take smaller frequency steps"
-        )
-    return nearest, farthest
-
-
-def imaged_sine(echo: Echo) -> float:
-    """Return the largest |sin φ| that is imaged: without grating lobes, and short of endfire."""
-    spacing = float(np.ptp(echo.positions[:, 0])) / (len(echo.positions) - 1)
-    return min(0.95, unaliased_sine(spacing, speed_of_light / float(echo.frequencies[-1])))
-
-
-def survey(echo: Echo) -> Survey:
-    """Image everything within reach, at half the resolution of a low-sidelobe taper.
-
-    Parameters
-    ----------
-    echo
-        In the array's frame.
-    """
-    resolution = echo_resolution(echo)
-    nearest, farthest = echo_reach(echo)
-    ranges = np.arange(nearest, farthest, 0.75 * resolution.along_ray)
-    limit = imaged_sine(echo)
-    count = 2 * int(np.ceil(limit / (0.75 * resolution.across_ray))) + 1
-    sines = np.linspace(-limit, limit, count)
-    points = np.zeros((ranges.size, count, 3))
-    points[..., 0] = ranges[:, None] * sines
-    points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
-    taper = survey_weights(echo)
-    values = backproject(echo, points, weights=taper)
-    peaks = significant_peaks(np.abs(values) ** 2, points)
-    tried = bent_intensities(range_profiles(echo), peaks, resolution)
-    # What the noise in the image is before the sum over the positions.
-    background = mean_background(np.abs(values) ** 2)
-    noise = background * taper.sum() ** 2 / (taper**2).sum()
-    across = frequency_taper(echo.frequencies, SURVEY_TAPER)
-    profiles = range_profiles(echo, weights=across[None, :])
-    by_shape = [
-        coherence(profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum()))
-        for flat in (False, True)
-    ]
-    return Survey(
-        values=values,
-        points=points,
-        peaks=peaks,
-        bent=(tried.max(axis=1) > MOST_GAIN * tried[:, 0])
-        & ~_faces(peaks, tried[:, 0], by_shape[1], resolution),
-        as_point=by_shape[0],
-        as_mirror=by_shape[1],
-        background=background,
-    )
-
-
-def _faces(
-    peaks: Float[np.ndarray, "peaks 3"],
-    intensity: Float[np.ndarray, " peaks"],
-    as_mirror: Float[np.ndarray, " peaks"],
-    resolution: Resolution,
-) -> Bool[np.ndarray, " peaks"]:
-    """Tell which peaks belong to a surface that faces the array and so reflects it.
-
-    All of it has nearly one range: its peaks disturb each other, and their bends mean nothing.
-    """
-    belongs = np.zeros(len(peaks), dtype=bool)
-    for flash in np.flatnonzero(as_mirror >= REFLECTED):
-        ray = peaks[flash] / np.linalg.norm(peaks[flash])
-        level = np.abs((peaks - peaks[flash]) @ ray) < 2 * resolution.along_ray
-        belongs |= level & (intensity > FACE * intensity[flash])
-    return belongs
 
 
 def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
@@ -351,20 +222,6 @@ def _to_its_ends(
         return line
     shorter = fit_between(plain, tapered, *ends, resolution, trials=1)
     return line if shorter is None else replace(shorter, confidence=line.confidence)
-
-
-def focus_within(focuser: Focuser, farthest: float) -> Focus:
-    """Return a function that focuses on points; beyond what is unambiguous there is 0."""
-
-    def focused(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
-        inside = np.einsum("...x,...x->...", points, points) < farthest**2
-        if np.all(inside):
-            return focus(focuser, points)
-        values = np.zeros(points.shape[:-1], dtype=np.complex128)
-        values[inside] = focus(focuser, points[inside])
-        return values
-
-    return focused
 
 
 def loose_peaks(

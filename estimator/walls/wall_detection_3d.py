@@ -13,13 +13,14 @@ from jaxtyping import Bool, Float
 from scipy.spatial import ConvexHull
 
 from estimator.array.planar_array import PlanarArray, planar_reach, planar_resolution
-from estimator.geometry.path_tracing_3d import PlaneWall, within
+from estimator.array.resolution_cell import Resolution, coarse_resolution
+from estimator.geometry.wall_3d import PlaneWall, within
 from estimator.imaging.backprojection import prepare
+from estimator.imaging.focusing import focus_within
 from estimator.imaging.range_compression import range_profiles
 from estimator.imaging.range_gating import gated
 from estimator.imaging.survey_3d import VolumeSurvey, lobe_origins
 from estimator.measurement.model import Echo
-from estimator.walls.line_detection import Resolution, coarse_resolution
 from estimator.walls.plane_detection import find_planes
 from estimator.walls.plane_fit import (
     FittedPlane,
@@ -29,7 +30,6 @@ from estimator.walls.plane_fit import (
     refine_plane,
     towards_array,
 )
-from estimator.walls.wall_detection_2d import focus_within
 from estimator.wavefronts.curvature_search_3d import search_wavefront
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
 

@@ -46,17 +46,6 @@ class WavefrontError:
     slope: float  # along half a cosine over the band, of mean square 1 [rad²]
 
 
-def noise_variance(samples: Complex[np.ndarray, "elements freqs"]) -> float:
-    """Estimate the noise in each sample from the delays at which nothing arrives.
-
-    The median over all delays is blind to the few that hold signal; a Hann window keeps the
-    signal's sidelobes out of the others.
-    """
-    window = np.hanning(samples.shape[1] + 2)[1:-1]
-    delays = np.abs(np.fft.fft(samples * window, axis=1)) ** 2
-    return float(np.median(delays)) / float(np.log(2)) / float(np.sum(window**2))
-
-
 def wavefront_error(
     left: Complex[np.ndarray, "elements freqs"],
     wave: Complex[np.ndarray, "elements freqs"],

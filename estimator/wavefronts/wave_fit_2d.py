@@ -23,7 +23,8 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import UNIFORM_STEP, Uplink
-from estimator.wavefronts.phase_error import noise_variance, wavefront_error
+from estimator.wavefronts.noise_variance import noise_variance
+from estimator.wavefronts.phase_error import wavefront_error
 
 ITERATIONS = 40
 CONVERGED = 1e-2

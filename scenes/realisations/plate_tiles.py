@@ -12,7 +12,7 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from scenes.surfaces.facet_spacing import steps
 from scenes.surfaces.heights import Heights
-from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.shape import grid_triangles
 
 ROWS_AT_ONCE = 256
 """Rows of heights whose slopes are looked at in one go. [-]"""

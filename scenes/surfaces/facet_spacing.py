@@ -1,21 +1,8 @@
 """How finely a surface must be cut into facets, and how many facets that makes."""
 
 import math
-from collections.abc import Mapping
 
-import numpy as np
-
-from scenes.meshes.mesh_file import placed_mesh
-from scenes.schema.objects import (
-    LARGEST_RELATIVE_RMS,
-    Body,
-    Box,
-    Cylinder,
-    MeshFile,
-    Plate,
-    largest_size,
-    smallest_size,
-)
+from scenes.schema.objects import Body, Box, Cylinder, Plate
 
 FACETS_PER_WAVELENGTH = 4
 """Facets per shortest wavelength: the phase turns by at most π over one, there and back [-]."""
@@ -26,11 +13,6 @@ FACETS_PER_CORRELATION_LENGTH = 4
 FACETS_PER_CUTOFF = 2
 """Facets per inner cut-off: what an exponential spectrum has beyond is below e^(-π²) [-]."""
 
-BYTES_PER_FACET = 128
-"""What a facet takes: two vertices or their share, centre, normal, size, field [byte]."""
-
-MOST_BYTES = 16 * 2**30
-"""What the facets of a scenario may take in all [byte]."""
 
 FEWEST_ROUND = 64
 """Fewest lines around a cylinder, however coarse the spacing: 6° each [-]."""
@@ -100,94 +82,3 @@ def mesh_facet_count(area: float, faces: int, spacing: float) -> int:
     of the largest area; the estimate takes the smaller.
     """
     return faces + math.ceil(4 * area / spacing**2)
-
-
-def facet_counts(
-    objects: Mapping[str, Plate | Cylinder | Box | MeshFile],
-    shortest_wavelength: float,
-    *,
-    flat: bool = False,
-) -> dict[str, int]:
-    """Count the facets of whole objects, by name; parameters as in :func:`facet_problems`."""
-    counts: dict[str, int] = {}
-    for name, drawn in objects.items():
-        spacing, body = facet_spacing(drawn, shortest_wavelength), drawn.frozen or drawn
-        if not isinstance(body, MeshFile):
-            counts[name] = facet_count(body, spacing)
-        elif flat:
-            counts[name] = _mesh_line_count(body, spacing)
-        else:
-            mesh = placed_mesh(body)
-            counts[name] = len(mesh.faces)
-            if body.facets == "cut":
-                counts[name] = mesh_facet_count(mesh.area, len(mesh.faces), spacing)
-    return counts
-
-
-def facet_problems(
-    objects: Mapping[str, Plate | Cylinder | Box | MeshFile],
-    shortest_wavelength: float,
-    *,
-    flat: bool = False,
-) -> list[str]:
-    """Find rough surfaces that cannot be, and facets that would not fit into memory.
-
-    Parameters
-    ----------
-    objects
-        By name.
-    shortest_wavelength
-        At the highest frequency of the radio. [m]
-    flat
-        Whether the scene has two dimensions, so that meshes become lines.
-
-    Returns
-    -------
-    A line for each problem, with the keys, the values, the limit and the remedy.
-    """
-    found = []
-    for name, body in objects.items():
-        if not isinstance(body, MeshFile):
-            found += _roughness_problems(name, body)
-    counts = facet_counts(objects, shortest_wavelength, flat=flat)
-    needed = sum(counts.values()) * BYTES_PER_FACET
-    if needed > MOST_BYTES:
-        name = max(counts, key=lambda key: counts[key])
-        spacing = facet_spacing(objects[name], shortest_wavelength)
-        found.append(
-            f"objects.{name}: needs {counts[name]:.3g} facets at a spacing of "
-            f"{spacing * 1e3:.3g} mm, all objects {needed / 2**30:.3g} GiB, more than "
-            f"{MOST_BYTES >> 30} GiB; make it smaller, lower radio.stop_ghz, or raise "
-            f"objects.{name}.roughness.correlation_mm (or set roughness.rms_mm = 0: smooth)"
-        )
-    return found
-
-
-def _mesh_line_count(body: MeshFile, spacing: float) -> int:
-    from scenes.surfaces.mesh_section_2d import mesh_segments
-
-    starts, ends = mesh_segments(body)
-    if body.facets == "file":
-        return len(starts)
-    return len(starts) + math.ceil(float(np.linalg.norm(ends - starts, axis=-1).sum()) / spacing)
-
-
-def _roughness_problems(name: str, body: Plate | Cylinder | Box) -> list[str]:
-    rough = body.roughness
-    if rough is None or rough.rms == 0:
-        return []
-    found = []
-    highest = LARGEST_RELATIVE_RMS * smallest_size(body)
-    if rough.rms > highest:
-        found.append(
-            f"objects.{name}.roughness.rms_mm = {rough.rms_mm}: must be at most "
-            f"{highest * 1e3:.3g} mm, a tenth of the object's smallest size; lower it"
-        )
-    longest = largest_size(body)
-    if rough.correlation_length > longest:
-        found.append(
-            f"objects.{name}.roughness.correlation_mm = {rough.correlation_mm}: must be at most "
-            f"{longest * 1e3:.3g} mm, the object's largest size (around a cylinder: its radius); "
-            "lower it"
-        )
-    return found

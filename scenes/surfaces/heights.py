@@ -6,8 +6,8 @@ from typing import TypedDict
 import numpy as np
 from jaxtyping import Float
 
-from scenes.schema.objects import Roughness
-from scenes.surfaces.roughness_spectrum import Spectrum, rough_profile, rough_sheet
+from scenes.schema.roughness import Roughness, Spectrum
+from scenes.surfaces.roughness_spectrum import rough_profile, rough_sheet
 
 SAMPLES_PER_DETAIL = 8
 """Grid points per correlation length (or inner cut-off) from which heights at arbitrary places

@@ -11,13 +11,14 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from scenes.checks.facet_budget import BYTES_PER_FACET, MOST_BYTES
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.meshes.triangle_mesh import TriangleMesh
 from scenes.schema.errors import ScenarioError
 from scenes.schema.objects import MeshFile
-from scenes.surfaces.facet_spacing import BYTES_PER_FACET, MOST_BYTES, mesh_facet_count
+from scenes.surfaces.facet_spacing import mesh_facet_count
 from scenes.surfaces.heights import Heights
-from scenes.surfaces.primitives import Shape
+from scenes.surfaces.shape import Shape
 
 FLAT = 1e-4
 """Largest angle between coplanar triangles: 10 µm over 10 cm [rad]."""

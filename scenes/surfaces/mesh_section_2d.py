@@ -8,7 +8,7 @@ from scenes.schema.errors import ScenarioError
 from scenes.schema.objects import MeshFile
 from scenes.surfaces.facet_spacing import steps
 from scenes.surfaces.heights import Heights
-from scenes.surfaces.primitives import Shape
+from scenes.surfaces.shape import Shape
 
 UPRIGHT = 1e-4
 """Largest z of an upright triangle's unit normal: 10 µm over 10 cm [-]."""

@@ -1,7 +1,6 @@
 """Plates, cylinders and boxes as grids of facets: lines in 2-D, triangles in 3-D."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,21 +8,10 @@ from jaxtyping import Float, Int
 from scenes.schema.objects import Body, Box, Cylinder, Plate
 from scenes.surfaces.facet_spacing import steps, steps_round
 from scenes.surfaces.heights import Heights
+from scenes.surfaces.shape import Shape, grid_triangles
 from scenes.surfaces.tiled_faces import Face, Reach, TiledFace, tiled_face
 
 _UP = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Shape:
-    """Vertices and cells of one object."""
-
-    vertices: Float[np.ndarray, "vertices 3"]  # displaced by the roughness [m]
-    mean_vertices: Float[np.ndarray, "vertices 3"]  # of the smooth shape [m]
-    cells: Int[np.ndarray, "cells corners"]  # outward, or to the side of the plate's normal
-    screens: Int[np.ndarray, "screens 3"] = field(
-        default_factory=lambda: np.empty((0, 3), dtype=np.int64)
-    )  # triangles where nobody looks: they only block rays
 
 
 def upright_shape(body: Plate | Cylinder | Box, spacing: float, heights: Heights) -> Shape:
@@ -113,14 +101,6 @@ def _joined(faces: Sequence[TiledFace]) -> Shape:
         cells=np.concatenate([face.cells + s for face, s in zip(faces, starts, strict=True)]),
         screens=np.concatenate([face.screens + s for face, s in zip(faces, starts, strict=True)]),
     )
-
-
-def grid_triangles(
-    ids: Int[np.ndarray, "first second"],
-) -> Int[np.ndarray, "triangles 3"]:
-    """Cut a grid of vertices into triangles; their normals are first x second direction."""
-    a, b, c, d = (part.ravel() for part in (ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]))
-    return np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
 
 
 def _chain(count: int, *, closed: bool) -> Int[np.ndarray, "cells 2"]:

@@ -23,12 +23,11 @@ samples of the same stream sample the *same surface* more finely.
 """
 
 import math
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-Spectrum = Literal["gaussian", "exponential"]
+from scenes.schema.roughness import Spectrum
 
 NEGLIGIBLE = 1e-12
 """Waves weaker than this, relative to the strongest, are left out: 1e-6 of an amplitude [-]."""

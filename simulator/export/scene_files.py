@@ -11,13 +11,13 @@ the meshes of the frozen scene.
 from collections.abc import Iterator
 from xml.etree import ElementTree
 
+from scenes.checks.facet_budget import facet_counts
 from scenes.files.relocatable import relocatable
 from scenes.files.toml_writer import toml_text
 from scenes.meshes.ply_writer import ply_bytes
 from scenes.realisations.object_surface import Surface, object_surface
 from scenes.realisations.surface_mesh import surface_to_mesh
 from scenes.scenario import Scenario
-from scenes.surfaces.facet_spacing import facet_counts
 from simulator.export.sionna_scene import material_colour
 from simulator.geometry.mean_surfaces import mean_surfaces, rms_height
 from simulator.geometry.ray_scene import HALF_HEIGHT

@@ -27,20 +27,21 @@ from scipy.spatial import KDTree
 
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.beam_culling import Sight
+from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches
 from simulator.geometry.ray_scene import blocked
 from simulator.multibounce.diffuse_field_3d import diffuse_wave, facets_within_reach
 from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
-from simulator.scattering.patch_kernel import Links
-from simulator.scattering.patch_sum import Seen, scattered_by_patches
+from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg, diffuse_legs
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import trace_chain, unfolded_chain
 from simulator.specular.image_sources import DIRECT, Leg
 from simulator.specular.path_field import reflected_field
+from simulator.visibility.seen import Seen
 
 OFF_TARGET = 1e-4
 """How far the scattering centre is before the facet it stands for. [m]"""

@@ -15,23 +15,18 @@ from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from simulator.antennas.beam_culling import Sight, in_reach
+from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches
 from simulator.geometry.ray_scene import CLEARANCE, blocked
 from simulator.materials.reflection_coefficients import reflection_nodes
-from simulator.scattering.patch_kernel import Links
-from simulator.scattering.patch_sum import (
-    COEFFICIENT_ACCURACY,
-    Factor,
-    Look,
-    Seen,
-    scattered_by_patches,
-)
+from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, Factor, Look, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg
 from simulator.specular.image_method import ROUGHNESS_CLEARANCE, trace_chain
 from simulator.specular.image_sources import Leg, LegReflection
+from simulator.visibility.seen import Seen
 from simulator.visibility.shaft_culling import TILE, Sightlines, object_shape, scenario_obstacles
 
 FACETS_AT_ONCE = 500_000

@@ -28,11 +28,10 @@ from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
 from estimator.compute.engine import thread_count
-from simulator.geometry.facets import Facets
-from simulator.materials.layered_media import Material
+from simulator.antennas.ports import Ports
+from simulator.geometry.faces import Face
 from simulator.materials.reflection_table import reflection_table
 from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_planned
-from simulator.scattering.physical_optics import Ports
 
 COLUMNS_AT_ONCE = 1024
 """Facets of a target whose single links with a block of a wall are prepared together."""
@@ -45,37 +44,6 @@ FACTOR_BYTES = 2**30
 
 GROUP_WIDTH = 1e-3
 """Wall facets are taken together over this length to bound the lengths of paths. [m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Face:
-    """One side of a surface of line facets."""
-
-    centres: Float[np.ndarray, "facets 2"]  # [m]
-    normals: Float[np.ndarray, "facets 2"]  # unit vectors, to the side that scatters
-    sizes: Float[np.ndarray, " facets"]  # what each stands for in a sum over the surface [m]
-    edges: Float[np.ndarray, "facets 2"]  # [m]
-    source: Int[np.ndarray, " facets"]  # index of each facet in the whole set
-    surface: int  # which object the face belongs to
-    side: int  # 1: outer, or first; -1: the back of an open surface
-    material: Material
-
-    @property
-    def count(self) -> int:
-        """Number of facets."""
-        return len(self.sizes)
-
-    def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Face":
-        """Choose some of the facets."""
-        return Face(
-            **{
-                name: getattr(self, name)[chosen]
-                for name in ("centres", "normals", "sizes", "edges", "source")
-            },
-            surface=self.surface,
-            side=self.side,
-            material=self.material,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,26 +100,6 @@ class Bounds:
             longest=self.longest[ports, facets],
             origins=self.origins[ports, facets],
         )
-
-
-def two_faces(
-    facets: Facets, chosen: Int[np.ndarray, " chosen"], *, surface: int, material: Material
-) -> tuple[Face, ...]:
-    """Return the sides of a surface that scatter: the outer one, or both of an open surface."""
-    sides = (1, -1) if bool(facets.two_sided[chosen].any()) else (1,)
-    return tuple(
-        Face(
-            centres=facets.centres[chosen, :2],
-            normals=side * facets.normals[chosen, :2],
-            sizes=facets.sizes[chosen],
-            edges=facets.edges[chosen, 0, :2],
-            source=chosen,
-            surface=surface,
-            side=side,
-            material=material,
-        )
-        for side in sides
-    )
 
 
 def quadrature(face: Face, count: int) -> Face:

@@ -30,7 +30,8 @@ from scipy.constants import speed_of_light
 
 from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
-from simulator.geometry.facets import Facets
+from simulator.antennas.ports import Ports
+from simulator.geometry.faces import Face
 from simulator.materials.reflection_table import reflection_table
 from simulator.multibounce.frequency_interpolation import (
     EveryFrequency,
@@ -39,16 +40,13 @@ from simulator.multibounce.frequency_interpolation import (
 )
 from simulator.multibounce.iterative_physical_optics import (
     Bounds,
-    Face,
     Wave,
     direct,
     onward,
     onward_bounds,
     quadrature,
-    two_faces,
     unit,
 )
-from simulator.scattering.physical_optics import Ports
 
 MOST_BOUNCES = 3
 """Longest chain of surfaces that is summed. [-]"""
@@ -93,21 +91,6 @@ class Passage:
         """Work the wave out."""
         sent = direct(self.wall, self.ports, nodes)
         return onward(sent, self.wall, target, self.seen, self.bounds, nodes)
-
-
-def scattering_faces(facets: Facets) -> tuple[Face, ...]:
-    """Return both sides of open surfaces, and the outer one of closed surfaces."""
-    owner = np.zeros(facets.count, dtype=np.int64) if facets.material is None else facets.material
-    return tuple(
-        face
-        for surface in np.unique(owner).tolist()
-        for face in two_faces(
-            facets,
-            np.flatnonzero(owner == surface),
-            surface=surface,
-            material=facets.materials[surface],
-        )
-    )
 
 
 def ghost_echo(

@@ -23,20 +23,21 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from simulator.antennas.beam_culling import LEVEL, Sight, in_reach
+from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches, patch_side
 from simulator.geometry.ray_scene import CLEARANCE, blocked
 from simulator.materials.reflection_coefficients import reflection_nodes
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
-from simulator.scattering.patch_kernel import Links
-from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, Seen, scattered_by_patches
+from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.scene.scene_mirrors import SceneMirrors
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import trace_chain, unfolded_chain
 from simulator.specular.image_sources import DIRECT, Leg, LegReflection
 from simulator.specular.path_field import reflected_field
+from simulator.visibility.seen import Seen
 
 NUDGE = np.array([2e-5, 1.4e-5, 0.9e-5])
 """How far a receiver is moved either way to see whether its path meets an edge: farther than

@@ -5,12 +5,13 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex
 
+from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets
 from simulator.geometry.ray_scene import facets_visible
 from simulator.multibounce.multibounce_2d import SeveralProgress, ghost_echo, untold
 from simulator.multibounce.multibounce_3d import echo_over_mirrors
 from simulator.response.single_bounce_3d import scattered_in_space
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.array_antennas import array_sight, in_space, sending_sight
 from simulator.scene.radio_scene import RadioScene, antenna_pattern, facet_ports
 

@@ -19,12 +19,13 @@ from scenes.realisations.plate_tiles import PlateSheet, Tile, plate_sheet
 from scenes.scenario import Scenario
 from scenes.schema.antenna import Antenna
 from scenes.schema.objects import Plate
+from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, surface_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
 from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.materials.layered_media import Absorber, Material
 from simulator.scattering.bistatic_kernel import BistaticKernel, Port, pattern_table
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.radio_scene import (
     RadioScene,
     antenna_pattern,

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Complex
 
 from simulator.antennas.beam_culling import Sight, in_reach
-from simulator.scattering.patch_kernel import Links
+from simulator.antennas.links import Links
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.visibility.shaft_culling import Sightlines, object_shape, scenario_obstacles

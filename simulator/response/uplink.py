@@ -9,11 +9,12 @@ from jaxtyping import Complex
 from scenes.scenario import User
 from simulator.antennas.beam_culling import Sight
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import blocked
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
 from simulator.response.single_bounce_3d import scattered_in_space
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.array_antennas import array_sight, in_space, user_sight
 from simulator.scene.radio_scene import RadioScene, facet_ports
 from simulator.specular.diffuse_chains import diffuse_legs

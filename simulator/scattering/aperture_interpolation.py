@@ -16,9 +16,9 @@ from jaxtyping import Float, Int
 from scipy.constants import speed_of_light
 
 from simulator.antennas.antenna_pattern import AntennaPattern
+from simulator.antennas.links import Links
 from simulator.geometry.patches import Patches
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
-from simulator.scattering.patch_kernel import Links
 
 ACCURACY = 3e-5
 """Largest error of the interpolation along one axis, relative to the patch's sum. [-]"""

@@ -23,7 +23,7 @@ from scenes.realisations.object_surface import Surface
 from scenes.schema.antenna import Antenna, Isotropic
 from simulator.antennas.field_pattern import field_gain
 from simulator.materials.layered_media import Conductor, Material, reflection
-from simulator.scattering.facet_kernel import triangle_transform
+from simulator.scattering.triangle_transform import triangle_transform
 
 mi.set_variant(engine.mitsuba_variant())
 

@@ -21,11 +21,10 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from simulator.geometry.facets import Facets
 from simulator.numerics.nufft_sum import FrequencySum
+from simulator.scattering.triangle_transform import triangle_transform
 
 mi.set_variant(engine.mitsuba_variant())
 
-SERIES_DEGREE = 16
-"""As in :data:`simulator.scattering.physical_optics.SERIES_DEGREE`."""
 
 WAITING = 2
 """Links whose facets are ready before a core is free to sum them: each takes 40 byte a facet."""
@@ -214,27 +213,3 @@ def _turned(transmit: Any, receive: Any) -> Any:
     split = dr.select(scale > 0.0, (tm - te) / scale, 0.0)
     one_way = dr.select(upright > 0.0, mi.Float64(-1.0), mi.Float64(0.0))
     return mi.Float(dr.select(turn <= 1e-10, one_way, split))
-
-
-def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
-    """Average a linear phase over triangles; see physical_optics.facet_transform. [-]."""
-    mean = (first + second) * (1.0 / 3.0)
-    a, b, c = -mean, first - mean, second - mean
-    pairs = a * b + b * c + c * a
-    product = a * b * c
-    polynomials = [mi.Float(1.0), mi.Float(0.0), -pairs]
-    re, im = mi.Float(1.0), mi.Float(0.0)
-    for degree in range(2, SERIES_DEGREE + 1):
-        if degree > 2:
-            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
-        part = polynomials[degree] * (2.0 / math.factorial(degree + 2))
-        match degree % 4:
-            case 0:
-                re += part
-            case 1:
-                im += part
-            case 2:
-                re -= part
-            case 3:
-                im -= part
-    return re, im

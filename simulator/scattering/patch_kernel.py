@@ -24,14 +24,14 @@ from scipy.constants import speed_of_light
 
 from estimator.compute import engine
 from simulator.antennas.antenna_pattern import AntennaPattern
+from simulator.antennas.links import Links
 from simulator.geometry.patches import Patches
 from simulator.materials.layered_media import Conductor, Material, reflection
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
+from simulator.scattering.triangle_transform import triangle_transform
 
 mi.set_variant(engine.mitsuba_variant())
 
-SERIES_DEGREE = 12
-"""Terms of a triangle's transform: corner phases stay below π, and π¹³·2/15! is 4e-6."""
 
 SHAPE_NODES = 3
 """Frequencies at which a triangle's transform is worked out; in between it is a parabola. [-]"""
@@ -41,21 +41,6 @@ ANGLES = 2048
 
 ONE_WAY = 1e-9
 """Squared sine between the legs below which they are one, in single precision. [-]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Links:
-    """Places between which waves travel, pairwise; echoes if both are the same object."""
-
-    senders: Float[np.ndarray, "links 3"]  # [m]
-    receivers: Float[np.ndarray, "links 3"]  # [m]
-    sent: AntennaPattern
-    received: AntennaPattern
-
-    @property
-    def echo(self) -> bool:
-        """Whether each wave returns to where it came from."""
-        return self.receivers is self.senders and self.received is self.sent
 
 
 class PatchKernel:
@@ -308,30 +293,6 @@ class _End:
             front = dr.exp(power * dr.log(dr.maximum(cosine, 1e-30)))
             return dr.select(cosine > 0, self.peak * front, 0.0)
         return mi.Float(1.0)
-
-
-def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:
-    """Average a linear phase over triangles; see physical_optics.facet_transform. [-]."""
-    mean = (first + second) * (1.0 / 3.0)
-    a, b, c = -mean, first - mean, second - mean
-    pairs = a * b + b * c + c * a
-    product = a * b * c
-    polynomials = [mi.Float(1.0), mi.Float(0.0), -pairs]
-    re, im = mi.Float(1.0), mi.Float(0.0)
-    for degree in range(2, SERIES_DEGREE + 1):
-        if degree > 2:
-            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
-        part = polynomials[degree] * (2.0 / math.factorial(degree + 2))
-        match degree % 4:
-            case 0:
-                re = re + part
-            case 1:
-                im = im + part
-            case 2:
-                re = re - part
-            case 3:
-                im = im - part
-    return re, im
 
 
 def _turned(phase: Any) -> tuple[Any, Any]:

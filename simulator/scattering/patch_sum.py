@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -10,13 +9,15 @@ from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
 from estimator.compute.engine import thread_count
+from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.patches import Patches, cut_into_patches, patch_side
 from simulator.materials.layered_media import Absorber, Conductor, Material
 from simulator.materials.reflection_coefficients import echo_coefficient, reflection_nodes
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, lagrange_basis, nodes_needed
 from simulator.scattering.aperture_interpolation import GAIN, Aperture, find_aperture, node_counts
-from simulator.scattering.patch_kernel import Links, PatchKernel
+from simulator.scattering.patch_kernel import PatchKernel
+from simulator.visibility.seen import Seen
 
 ACCURACY = 3e-5
 """Largest error of the interpolation of a patch's sum over the band. [-]"""
@@ -38,15 +39,6 @@ MASKED_AT_ONCE = 2**27
 
 LINKS_AT_ONCE = 32
 """Links that are interpolated by one matrix product, on one thread. [-]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Seen:
-    """Which triangles are seen over which links, from both of their ends."""
-
-    always: Bool[np.ndarray, " facets"]
-    sometimes: Int[np.ndarray, " some"]  # indices; all others are never seen
-    table: Bool[np.ndarray, "some links"]
 
 
 Look = Callable[[Int[np.ndarray, " facets"]], Seen]

@@ -15,11 +15,9 @@ unit line source :math:`G = -\tfrac{j}{4} H_0^{(2)}(kr)`, for comparison with
 two-dimensional full-wave solvers.
 """
 
-import math
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
@@ -27,6 +25,7 @@ from scipy.constants import speed_of_light
 
 from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
+from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets
 from simulator.materials.layered_media import Absorber, Conductor, Material
 from simulator.materials.reflection_coefficients import (
@@ -37,9 +36,7 @@ from simulator.materials.reflection_coefficients import (
     reflection_nodes,
 )
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
-
-SERIES_DEGREE = 16
-"""Terms of a triangle's transform: corner phases stay below π, and π¹⁷·2/19! is 5e-9."""
+from simulator.scattering.triangle_transform import triangle_transform
 
 SAMPLES_AT_ONCE = 4_000_000
 """Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
@@ -54,23 +51,6 @@ its points about the centroid. [-]"""
 
 MOST_TRIED, MARGIN = 16, 1.1
 """Links of which the facets' slopes are looked at, and what the others may exceed them by."""
-
-Pattern = Callable[
-    [Float[np.ndarray, "facets 3"], Float[np.ndarray, " facets"], Float[np.ndarray, " nodes"]],
-    Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"],
-]
-"""Field over that of an isotropic port, from the unit directions that leave the port, the
-distances [m] and the frequencies [Hz]; a single row if it does not vary with frequency."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ports:
-    """Antenna ports at points of space, as the facets see them."""
-
-    positions: Float[np.ndarray, "ports 3"]  # [m]
-    pattern: Pattern
-    visible: Bool[np.ndarray, "ports facets"]
-    nodes: int = 1  # frequencies that the pattern has to be sampled at
 
 
 def scattered(
@@ -194,15 +174,6 @@ def _by_kernel(
     return 1j * spectrum
 
 
-def isotropic(
-    directions: Float[np.ndarray, "facets 3"],
-    distances: Float[np.ndarray, " facets"],
-    frequencies: Float[np.ndarray, " nodes"],
-) -> Float[np.ndarray, "1 facets"]:
-    """Pattern of an isotropic port."""
-    return np.ones((1, len(distances)))
-
-
 class _Part:
     """The facets of one material: how their sum over the band is sampled."""
 
@@ -321,10 +292,8 @@ def facet_transform(
 ) -> Float[np.ndarray, "nodes facets"] | Complex[np.ndarray, "nodes facets"]:
     r"""Average a linear phase over facets, relative to the phase at their centres.
 
-    A line gives :math:`\operatorname{sinc}(a/2)`. A triangle with corner phases
-    :math:`p_i`, :math:`\sum p_i = 0`, gives :math:`\sum_n \frac{2 j^n}{(n+2)!} h_n(p)` with
-    the complete homogeneous symmetric polynomials :math:`h_n = -e_2 h_{n-2} + e_3 h_{n-3}`;
-    unlike the quotient of exponentials it has no removable poles.
+    A line gives :math:`\operatorname{sinc}(a/2)`, a triangle the series of
+    :mod:`simulator.scattering.triangle_transform`.
 
     Parameters
     ----------
@@ -337,14 +306,5 @@ def facet_transform(
     """
     if advances.shape[-1] == 1:
         return np.asarray(np.sinc(advances[..., 0] / (2 * np.pi)))
-    corners = np.concatenate([np.zeros_like(advances[..., :1]), advances], axis=-1)
-    first, second, third = np.moveaxis(corners - corners.mean(axis=-1, keepdims=True), -1, 0)
-    pairs = first * second + second * third + third * first
-    product = first * second * third
-    polynomials = [np.ones_like(first), np.zeros_like(first), -pairs]
-    transform = polynomials[0] + 0j
-    for degree in range(2, SERIES_DEGREE + 1):
-        if degree > 2:
-            polynomials.append(-pairs * polynomials[-2] + product * polynomials[-3])
-        transform += polynomials[degree] * (2 * 1j**degree / math.factorial(degree + 2))
-    return np.asarray(transform)
+    re, im = triangle_transform(advances[..., 0], advances[..., 1])
+    return np.asarray(re + 1j * im)

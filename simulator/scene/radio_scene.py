@@ -15,6 +15,8 @@ from scenes.schema.antenna import Antenna, Isotropic
 from scenes.schema.materials import Slab
 from scenes.surfaces.tiled_faces import Reach
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.ports import Pattern, Ports, isotropic
+from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, scene_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.materials.layered_media import Absorber, Dielectric, Material, named_material
@@ -25,9 +27,7 @@ from simulator.materials.permittivity import (
     read_permittivity,
 )
 from simulator.materials.reflection_coefficients import reflection_nodes
-from simulator.multibounce.multibounce_2d import scattering_faces
 from simulator.receiver.impairments import position_jitter
-from simulator.scattering.physical_optics import Pattern, Ports, isotropic
 from simulator.scene.array_antennas import array_sight, in_space, needed_reach, sending_sight
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors
 from simulator.specular.diffuse_chains import diffuse_legs, may_reach

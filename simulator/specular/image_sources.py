@@ -14,8 +14,8 @@ from jaxtyping import Complex, Float
 
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.beam_culling import LEVEL, Sight
+from simulator.antennas.links import Links
 from simulator.geometry.mirrors import Mirrors
-from simulator.scattering.patch_kernel import Links
 from simulator.specular.image_method import unfolded_chain
 from simulator.specular.path_field import reflected_field
 

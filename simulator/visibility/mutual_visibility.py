@@ -8,8 +8,8 @@ import sionna.rt as rt
 from jaxtyping import Bool
 
 from scenes.schema.errors import ScenarioError
+from simulator.geometry.faces import Face
 from simulator.geometry.ray_scene import CLEARANCE, RAYS_AT_ONCE, blocked
-from simulator.multibounce.iterative_physical_optics import Face
 
 MOST_PAIRS = 2**30
 """Most pairs of facets of two surfaces: 1 GiB. [-]"""

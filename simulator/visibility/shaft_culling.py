@@ -23,7 +23,7 @@ from simulator.geometry.facets import Facets
 from simulator.geometry.mean_surfaces import mean_surfaces, rms_height
 from simulator.geometry.patches import cut_into_patches
 from simulator.geometry.ray_scene import facets_visible
-from simulator.scattering.patch_sum import Seen
+from simulator.visibility.seen import Seen
 
 TILE = 0.05
 """Side of the tiles that one shaft leads to. [m]"""

@@ -9,10 +9,11 @@ from scipy.special import hankel2, jv, spherical_jn, spherical_yn
 
 from scenes.realisations.object_surface import Surface
 from scenes.scenario import parse_scenario
-from scenes.surfaces.primitives import grid_triangles
 from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.shape import grid_triangles
+from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets, surface_facets
-from simulator.scattering.physical_optics import Ports, isotropic, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.simulation import simulate
 

@@ -33,7 +33,8 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from scenes.schema.antenna import Antenna
-from scenes.schema.objects import Plate, Roughness
+from scenes.schema.objects import Plate
+from scenes.schema.roughness import Roughness
 from simulator.antennas.field_pattern import field_gain
 from simulator.materials.layered_media import Material
 from simulator.materials.reflection_coefficients import facet_coefficients

@@ -17,8 +17,8 @@ from scenes.random_streams import random_stream
 from scenes.scenario import Scenario
 from scenes.schema.base_station import BaseStation
 from scenes.schema.radio import Radio
+from simulator.antennas.ports import Ports
 from simulator.response.uplink import simulate_uplink
-from simulator.scattering.physical_optics import Ports
 from simulator.scene.radio_scene import RadioScene, facet_ports, radio_scene
 from validation.analytic.point_scatterer import complex_noise
 

@@ -27,7 +27,8 @@ from scipy.signal import fftconvolve
 
 from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
-from scenes.schema.objects import Plate, Roughness
+from scenes.schema.objects import Plate
+from scenes.schema.roughness import Roughness
 from simulator.scene.array_antennas import array_sight, user_sight
 from validation.bounds.position_bound import (
     Plane,

@@ -48,7 +48,7 @@ from jaxtyping import Complex, Float, Int
 from matplotlib.axes import Axes
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.mapping.map_2d import build_room_map
 from estimator.prediction.channel_2d import predict_channel
 from scenes.files.loading import load_scenario

@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from estimator.geometry.path_tracing_2d import Wall
+from estimator.geometry.wall_2d import Wall
 from estimator.localization.locate import locate
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_positioning import SeenWall, search_diffuse

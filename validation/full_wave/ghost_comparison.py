@@ -17,10 +17,11 @@ from jaxtyping import Complex, Float
 
 from estimator.measurement.model import MeasurementError
 from scenes.realisations.object_surface import Surface
+from simulator.antennas.ports import Ports, isotropic
+from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import joined, profile_surface, surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
-from simulator.multibounce.multibounce_2d import ghost_echo, scattering_faces
-from simulator.scattering.physical_optics import Ports, isotropic
+from simulator.multibounce.multibounce_2d import ghost_echo
 from simulator.visibility.mutual_visibility import facets_see_each_other
 from validation.full_wave.wall_comparison import read_reference
 

@@ -19,9 +19,10 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import MeasurementError
+from simulator.antennas.ports import Pattern, Ports, isotropic
 from simulator.geometry.facets import profile_surface, surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
-from simulator.scattering.physical_optics import Pattern, Ports, isotropic, scattered
+from simulator.scattering.physical_optics import scattered
 
 BEAM_PARAMETER = 0.097
 """Imaginary displacement b of the reference's complex source. Its file does not state it; the

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from estimator.array.resolution import cell_at
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.geometry.wall_2d import mirrored
 from estimator.localization.locate import locate
 from estimator.measurement.model import Echo, Measurement
 from estimator.results.estimate import Estimate, Image

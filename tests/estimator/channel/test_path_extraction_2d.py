@@ -17,7 +17,7 @@ from estimator.channel.angle_range_map_2d import (
 from estimator.channel.path_extraction_2d import LEAST_SHARE, Path, find_paths
 from estimator.measurement.model import Uplink
 from estimator.wavefronts.curvature_search_2d import search_curvature
-from estimator.wavefronts.phase_error import noise_variance
+from estimator.wavefronts.noise_variance import noise_variance
 
 COUNT = 64
 BAND = np.linspace(220e9, 295e9, 126)  # 0.5 m of unambiguous path

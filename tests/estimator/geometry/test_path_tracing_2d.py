@@ -6,14 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import (
-    MOST_BOUNCES,
-    Projection,
-    Wall,
-    crossing,
-    mirrored,
-    project,
-)
+from estimator.geometry.path_tracing_2d import MOST_BOUNCES, Projection, project
+from estimator.geometry.wall_2d import Wall, crossing, mirrored
 
 NOTHING = np.zeros((2, 2))
 COORDINATE = st.floats(-2.0, 2.0)

@@ -2,13 +2,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.geometry.path_tracing_3d import (
-    PlaneWall,
-    hidden_by,
-    mirrored_about,
-    project_in_space,
-    within,
-)
+from estimator.geometry.path_tracing_3d import project_in_space
+from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about, within
 from estimator.walls.plane_fit import plane_axes
 
 

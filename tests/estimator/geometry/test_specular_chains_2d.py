@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored, project
+from estimator.geometry.path_tracing_2d import project
 from estimator.geometry.specular_chains_2d import image_over, possible_chains, seen_over, unfolded
+from estimator.geometry.wall_2d import Wall, mirrored
 
 ROUNDING = 1e-12
 

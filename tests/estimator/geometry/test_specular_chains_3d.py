@@ -6,20 +6,16 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_3d import (
-    PlaneWall,
-    folded_over,
-    mirrored_about,
-    project_in_space,
-)
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.path_tracing_3d import folded_over, project_in_space
 from estimator.geometry.specular_chains_3d import (
     chains_in_space,
     image_in_space,
     seen_over_in_space,
     unfolded_in_space,
 )
+from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.mapping.map_3d import corrected_values, fold_planes
-from estimator.walls.line_detection import Resolution
 from estimator.walls.plane_fit import FittedPlane, plane_axes
 
 

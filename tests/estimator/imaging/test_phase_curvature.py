@@ -7,11 +7,11 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.array.linear_array import echo_resolution
+from estimator.geometry.wall_2d import mirrored
 from estimator.imaging.phase_curvature import BENDS, bent_intensities, coherence
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
 from estimator.measurement.model import Echo
-from estimator.walls.wall_detection_2d import echo_resolution
 
 POINT = np.array([0.05, 0.33, 0.0])
 WALL = np.array([-0.1, 0.1, 0.0]), np.array([0.1, 0.3, 0.0])  # 45° through (0, 0.2)

@@ -12,7 +12,7 @@ from scipy.constants import speed_of_light
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.geometry.wall_2d import mirrored
 from estimator.localization.locate import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.results.estimate import Estimate, UserEstimate

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import mirrored
 from estimator.mapping.diffuse_multipath import between, in_cloud
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
 WALL = FittedLine(

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.imaging.backprojection import focus, prepare
 from estimator.imaging.range_compression import range_profiles
 from estimator.mapping.ghost_correction import corrected_image

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_3d import PlaneWall, mirrored_about
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.imaging.range_gating import gated
 from estimator.mapping.map_3d import corrected_values, mirrored_wall
 from estimator.measurement.model import Echo, Uplink
-from estimator.walls.line_detection import Resolution
 from estimator.walls.plane_detection import find_planes
 from estimator.walls.plane_fit import plane_axes
 from estimator.walls.wall_detection_3d import wall_of_wave

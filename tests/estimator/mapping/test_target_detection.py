@@ -7,7 +7,7 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.geometry.wall_2d import mirrored
 from estimator.mapping.map_2d import RoomMap, build_room_map
 from estimator.measurement.model import Echo
 

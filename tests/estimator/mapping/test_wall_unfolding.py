@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.array.resolution_cell import Resolution
 from estimator.geometry.specular_chains_2d import image_over
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.mapping.wall_unfolding import fold_lines, fold_seen_lines, place_covariance
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
 DEVIATIONS = np.array([2e-4, 3e-5])  # of angle [rad] and offset [m]

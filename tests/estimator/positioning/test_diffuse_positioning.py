@@ -5,12 +5,12 @@ import pytest
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_fallback import with_diffuse_search
 from estimator.positioning.diffuse_positioning import SeenWall, further_distances, search_diffuse
 from estimator.results.estimate import PathReport, UserEstimate
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 
 FREQUENCIES = np.linspace(220e9, 295e9, 301)  # unambiguous to 1.2 m
 ELEMENTS = np.stack([0.5e-3 * (np.arange(200) - 99.5), np.zeros(200), np.zeros(200)], axis=-1)

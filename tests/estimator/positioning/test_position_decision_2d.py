@@ -8,11 +8,11 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.linalg import block_diag
 
+from estimator.array.resolution_cell import Resolution
 from estimator.channel.path_extraction_2d import Path, PathSet
-from estimator.geometry.path_tracing_2d import Wall
+from estimator.geometry.wall_2d import Wall
 from estimator.positioning.position_decision_2d import decide
 from estimator.results.estimate import UserEstimate
-from estimator.walls.line_detection import Resolution
 from estimator.wavefronts.wave_fit_2d import SphericalWave
 
 NOTHING_LOOSE = np.zeros((0, 3))

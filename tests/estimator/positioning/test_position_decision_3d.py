@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.channel.path_extraction_3d import SpacePath
-from estimator.geometry.path_tracing_3d import PlaneWall, mirrored_about
+from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.positioning.position_decision_3d import decide_in_space
 from estimator.results.estimate import UserEstimate
 from estimator.walls.plane_fit import plane_axes

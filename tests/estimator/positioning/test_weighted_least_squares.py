@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
-from estimator.geometry.path_tracing_2d import Wall, mirrored
+from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.positioning.weighted_least_squares import Sighting, block_covariance, solve_position
 
 WALL = Wall(

@@ -8,7 +8,8 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.array_frame import array_frame
-from estimator.geometry.path_tracing_2d import Wall, project
+from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.wall_2d import Wall
 from estimator.prediction.channel_2d import PredictedPath, predict_channel, predict_user_channel
 from estimator.prediction.wall_reflection import (
     ASSUMED_DB,

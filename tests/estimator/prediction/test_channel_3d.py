@@ -5,8 +5,9 @@ import pytest
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_3d import PlaneWall, project_in_space
+from estimator.geometry.path_tracing_3d import project_in_space
 from estimator.geometry.specular_chains_3d import image_in_space
+from estimator.geometry.wall_3d import PlaneWall
 from estimator.prediction.channel_3d import PredictedSpacePath, predict_channel_in_space
 from estimator.walls.plane_fit import plane_axes
 

@@ -6,14 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float
 
-from estimator.walls.line_detection import (
-    FEWEST_INLIERS,
-    MOST_PEAKS,
-    LineCandidate,
-    Resolution,
-    find_lines,
-    significant_peaks,
-)
+from estimator.array.resolution_cell import Resolution
+from estimator.imaging.peak_detection import MOST_PEAKS, significant_peaks
+from estimator.walls.line_detection import FEWEST_INLIERS, LineCandidate, find_lines
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=1e-2)  # 75 GHz; an aperture of 6 cm
 

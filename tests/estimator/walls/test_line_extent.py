@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
+from estimator.array.linear_array import echo_resolution
 from estimator.imaging.backprojection import prepare
+from estimator.imaging.focusing import focus_within
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
-from estimator.walls.face_ends import face_ends
-from estimator.walls.line_fit_image import FittedLine
-from estimator.walls.wall_detection_2d import echo_resolution, focus_within
+from estimator.walls.fitted_line import FittedLine
+from estimator.walls.line_extent import face_ends
 
 FAR = 0.33
 FACE = -0.02, 0.01  # within what the array of 5 cm sees in reflection

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from jaxtyping import Complex, Float
 
+from estimator.array.resolution_cell import Resolution
 from estimator.imaging.backprojection import focus, prepare
 from estimator.imaging.range_compression import range_profiles
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine, fit_line
+from estimator.walls.fitted_line import FittedLine
+from estimator.walls.line_fit_image import fit_line
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=1e-2)
 REACH = (0.05, 2.0)

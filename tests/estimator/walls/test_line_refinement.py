@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.geometry.path_tracing_2d import unit_normal
-from estimator.walls.line_fit_image import FittedLine
+from estimator.geometry.wall_2d import unit_normal
+from estimator.imaging.survey_2d import survey
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import MOST_DEVIATIONS, refine_by_echo
-from estimator.walls.wall_detection_2d import detect_mirrors, survey
+from estimator.walls.wall_detection_2d import detect_mirrors
 
 MIDDLE, ANGLE, LENGTH = (0.0, 0.28), 25.0, 0.18
 ASIDE = 0.15e-3  # much less than a cell of 2 to 3 mm [m]

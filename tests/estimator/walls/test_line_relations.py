@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import mirrored
-from estimator.walls.line_detection import Resolution
-from estimator.walls.line_fit_image import FittedLine
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import mirrored
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_relations import seen_twice
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from jaxtyping import Complex, Float
 
-from estimator.geometry.path_tracing_3d import PlaneWall
-from estimator.walls.line_detection import Resolution
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_3d import PlaneWall
 from estimator.walls.plane_fit import LEAN, plane_axes, refine_plane
 
 BEAM = 0.2  # where the wall's brightness has fallen to 1/e [m]

@@ -8,18 +8,16 @@ import pytest
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
+from estimator.imaging.survey_2d import survey
 from estimator.measurement.model import Echo, MeasurementError
-from estimator.walls.line_fit_image import FittedLine
+from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
 from estimator.walls.wall_detection_2d import (
     LEAST_CELLS,
     LEAST_CONFIDENCE,
     detect_mirrors,
-    echo_reach,
-    echo_resolution,
-    imaged_sine,
     loose_peaks,
-    survey,
 )
 
 WALLS = 12

@@ -4,6 +4,7 @@ import time
 import pytest
 from rich.console import Console
 
+from mmslam.terminal import stage_progress
 from mmslam.terminal.stage_progress import StageProgress
 
 

@@ -214,7 +214,7 @@ def test_what_does_not_stand_upright_in_two_dimensions_is_refused(room: Path) ->
 
 
 def test_lines_of_a_mesh_are_not_made_rough(room: Path) -> None:
-    from scenes.schema.objects import Roughness
+    from scenes.schema.roughness import Roughness
     from scenes.surfaces.heights import Heights
 
     found = scenario({"file": str(room), "materials": PAINTED}, dimensions=2)

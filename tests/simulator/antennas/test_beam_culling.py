@@ -8,9 +8,10 @@ import pytest
 from scenes.scenario import Scenario, parse_scenario
 from scenes.schema.antenna import Isotropic
 from simulator.antennas.beam_culling import LEVEL, in_reach
+from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import facets_visible
 from simulator.response.single_bounce_3d import scattered_in_space, sightlines
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.array_antennas import array_sight, user_sight
 from simulator.scene.radio_scene import RadioScene, radio_scene
 

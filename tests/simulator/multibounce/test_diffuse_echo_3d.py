@@ -11,14 +11,15 @@ from scipy.constants import speed_of_light
 from scenes.scenario import Scenario, parse_scenario
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.beam_culling import Sight
+from simulator.antennas.links import Links
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_3d import coherent_echo
-from simulator.scattering.patch_kernel import Links
-from simulator.scattering.patch_sum import Seen, scattered_by_patches
+from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.array_antennas import array_sight
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.specular.diffuse_chains import diffuse_legs
+from simulator.visibility.seen import Seen
 
 SEEDS = 40
 

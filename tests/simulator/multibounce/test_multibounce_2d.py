@@ -11,18 +11,16 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from estimator.measurement.model import Waves
 from scenes.realisations.object_surface import Surface
+from simulator.antennas.ports import Pattern, Ports
+from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, joined, profile_surface, surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.materials.layered_media import Dielectric
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.multibounce.frequency_interpolation import CHAIN_ACCURACY, nodes_for_chain
-from simulator.multibounce.multibounce_2d import (
-    ghost_echo,
-    scattering_faces,
-    uplink_over_surfaces,
-)
+from simulator.multibounce.multibounce_2d import ghost_echo, uplink_over_surfaces
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
-from simulator.scattering.physical_optics import Pattern, Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.visibility.mutual_visibility import MutualVisibility
 
 BAND = np.linspace(220e9, 240e9, 4)

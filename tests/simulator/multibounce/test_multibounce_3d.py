@@ -11,14 +11,15 @@ from scipy.constants import speed_of_light
 from scenes.scenario import Scenario, parse_scenario
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.beam_culling import Sight
+from simulator.antennas.links import Links
 from simulator.materials.layered_media import Conductor
 from simulator.multibounce.multibounce_3d import coherent_echo, echo_over_mirrors
 from simulator.response.uplink import simulate_uplink
-from simulator.scattering.patch_kernel import Links
-from simulator.scattering.patch_sum import Seen, scattered_by_patches
+from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.array_antennas import array_sight
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.specular.path_field import roughness_loss
+from simulator.visibility.seen import Seen
 
 ACCURACY = 1e-3
 """Of sums over images, relative: those of patches (2e-4), a patch's reflection taken at its

@@ -9,6 +9,7 @@ from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario, parse_scenario
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.ports import Ports
 from simulator.geometry.facets import surface_facets
 from simulator.materials.layered_media import (
     Conductor,
@@ -24,7 +25,7 @@ from simulator.scattering.bistatic_kernel import (
     pattern_table,
     reflection_rows,
 )
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.scene.radio_scene import antenna_pattern
 
 FREQUENCIES = np.linspace(300e9, 330e9, 11)  # more than one kernel's

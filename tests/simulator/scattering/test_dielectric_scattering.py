@@ -9,12 +9,13 @@ from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
-from scenes.surfaces.primitives import grid_triangles
+from scenes.surfaces.shape import grid_triangles
+from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, joined, profile_surface, surface_facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.materials.layered_media import Absorber, Conductor, Dielectric, Material, reflection
 from simulator.materials.permittivity import ConstantPermittivity
-from simulator.scattering.physical_optics import Ports, scattered
+from simulator.scattering.physical_optics import scattered
 from simulator.simulation import simulate
 from simulator.specular.image_method import find_chains
 from simulator.specular.path_field import specular_response

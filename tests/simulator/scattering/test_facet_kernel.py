@@ -8,19 +8,14 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface
-from scenes.surfaces.primitives import grid_triangles
 from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.shape import grid_triangles
+from simulator.antennas.ports import Pattern, Ports, isotropic
 from simulator.geometry.facets import Facets, joined, surface_facets
 from simulator.materials.layered_media import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering import physical_optics
-from simulator.scattering.physical_optics import (
-    Pattern,
-    Ports,
-    facet_transform,
-    isotropic,
-    scattered,
-)
+from simulator.scattering.physical_optics import facet_transform, scattered
 
 BAND = np.linspace(220e9, 295e9, 101)
 PANE = Dielectric(permittivity=ConstantPermittivity(value=2.5 - 0.05j), thickness=1.5e-3)

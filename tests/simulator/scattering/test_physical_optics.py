@@ -13,10 +13,11 @@ from scipy.special import hankel2
 
 from estimator.measurement.model import Waves
 from scenes.realisations.object_surface import Surface
-from scenes.surfaces.primitives import grid_triangles
 from scenes.surfaces.roughness_spectrum import rough_profile
+from scenes.surfaces.shape import grid_triangles
+from simulator.antennas.ports import Pattern, Ports
 from simulator.geometry.facets import Facets, profile_surface, surface_facets
-from simulator.scattering.physical_optics import Pattern, Ports, facet_transform, scattered
+from simulator.scattering.physical_optics import facet_transform, scattered
 
 BAND = np.linspace(220e9, 295e9, 76)
 WAVENUMBERS = 2 * np.pi * BAND / speed_of_light

@@ -8,7 +8,8 @@ from scipy.constants import speed_of_light
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario, parse_scenario
-from scenes.schema.objects import Plate, Roughness
+from scenes.schema.objects import Plate
+from scenes.schema.roughness import Roughness
 from simulator.antennas.field_pattern import horn_beam_width
 from simulator.materials.layered_media import Conductor
 from simulator.scene.radio_scene import scenario_materials

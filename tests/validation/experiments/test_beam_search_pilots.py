@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.geometry.path_tracing_2d import mirrored
+from estimator.geometry.wall_2d import mirrored
 from validation.experiments import beam_search_pilots as experiment
 from validation.experiments.beam_search_pilots import (
     DEVIATIONS,

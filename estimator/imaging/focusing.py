@@ -1,0 +1,25 @@
+"""An image as a function of points."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from estimator.imaging.backprojection import Focuser, focus
+
+Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
+"""Focuses the echo on points."""
+
+
+def focus_within(focuser: Focuser, farthest: float) -> Focus:
+    """Return a function that focuses on points; beyond what is unambiguous there is 0."""
+
+    def focused(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
+        inside = np.einsum("...x,...x->...", points, points) < farthest**2
+        if np.all(inside):
+            return focus(focuser, points)
+        values = np.zeros(points.shape[:-1], dtype=np.complex128)
+        values[inside] = focus(focuser, points[inside])
+        return values
+
+    return focused

@@ -1,0 +1,42 @@
+"""A straight wall as it was fitted to the image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.geometry.wall_2d import unit_normal
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedLine:
+    """A segment in the array's frame, with the statistics of its angle and offset."""
+
+    start: Float[np.ndarray, " 3"]  # [m]
+    end: Float[np.ndarray, " 3"]  # [m]
+    covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
+    level: float  # mean intensity along it [-]
+    background: float  # mean intensity beside it [-]
+    confidence: float  # one minus the probability that background alone does this
+
+    @property
+    def middle(self) -> Float[np.ndarray, " 3"]:
+        """Midpoint. [m]."""
+        middle: np.ndarray = 0.5 * (self.start + self.end)
+        return middle
+
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """Unit normal, to the right of start to end."""
+        return unit_normal(self.start, self.end)
+
+    @property
+    def length(self) -> float:
+        """Length. [m]."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    @property
+    def direction(self) -> Float[np.ndarray, " 3"]:
+        """Unit vector from start to end."""
+        direction: np.ndarray = (self.end - self.start) / self.length
+        return direction

@@ -1,0 +1,33 @@
+"""Antenna ports: where they stand and how their fields depend on direction."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+
+Pattern = Callable[
+    [Float[np.ndarray, "facets 3"], Float[np.ndarray, " facets"], Float[np.ndarray, " nodes"]],
+    Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"],
+]
+"""Field over that of an isotropic port, from the unit directions that leave the port, the
+distances [m] and the frequencies [Hz]; a single row if it does not vary with frequency."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ports:
+    """Antenna ports at points of space, as the facets see them."""
+
+    positions: Float[np.ndarray, "ports 3"]  # [m]
+    pattern: Pattern
+    visible: Bool[np.ndarray, "ports facets"]
+    nodes: int = 1  # frequencies that the pattern has to be sampled at
+
+
+def isotropic(
+    directions: Float[np.ndarray, "facets 3"],
+    distances: Float[np.ndarray, " facets"],
+    frequencies: Float[np.ndarray, " nodes"],
+) -> Float[np.ndarray, "1 facets"]:
+    """Pattern of an isotropic port."""
+    return np.ones((1, len(distances)))

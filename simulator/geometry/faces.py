@@ -1,0 +1,75 @@
+"""The faces of a body: lines of facets between its corners."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from simulator.geometry.facets import Facets
+from simulator.materials.layered_media import Material
+
+
+@dataclass(frozen=True, kw_only=True)
+class Face:
+    """One side of a surface of line facets."""
+
+    centres: Float[np.ndarray, "facets 2"]  # [m]
+    normals: Float[np.ndarray, "facets 2"]  # unit vectors, to the side that scatters
+    sizes: Float[np.ndarray, " facets"]  # what each stands for in a sum over the surface [m]
+    edges: Float[np.ndarray, "facets 2"]  # [m]
+    source: Int[np.ndarray, " facets"]  # index of each facet in the whole set
+    surface: int  # which object the face belongs to
+    side: int  # 1: outer, or first; -1: the back of an open surface
+    material: Material
+
+    @property
+    def count(self) -> int:
+        """Number of facets."""
+        return len(self.sizes)
+
+    def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Face":
+        """Choose some of the facets."""
+        return Face(
+            **{
+                name: getattr(self, name)[chosen]
+                for name in ("centres", "normals", "sizes", "edges", "source")
+            },
+            surface=self.surface,
+            side=self.side,
+            material=self.material,
+        )
+
+
+def two_faces(
+    facets: Facets, chosen: Int[np.ndarray, " chosen"], *, surface: int, material: Material
+) -> tuple[Face, ...]:
+    """Return the sides of a surface that scatter: the outer one, or both of an open surface."""
+    sides = (1, -1) if bool(facets.two_sided[chosen].any()) else (1,)
+    return tuple(
+        Face(
+            centres=facets.centres[chosen, :2],
+            normals=side * facets.normals[chosen, :2],
+            sizes=facets.sizes[chosen],
+            edges=facets.edges[chosen, 0, :2],
+            source=chosen,
+            surface=surface,
+            side=side,
+            material=material,
+        )
+        for side in sides
+    )
+
+
+def scattering_faces(facets: Facets) -> tuple[Face, ...]:
+    """Return both sides of open surfaces, and the outer one of closed surfaces."""
+    owner = np.zeros(facets.count, dtype=np.int64) if facets.material is None else facets.material
+    return tuple(
+        face
+        for surface in np.unique(owner).tolist()
+        for face in two_faces(
+            facets,
+            np.flatnonzero(owner == surface),
+            surface=surface,
+            material=facets.materials[surface],
+        )
+    )
