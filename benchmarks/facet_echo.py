@@ -29,7 +29,7 @@ from simulator.geometry.facets import Facets
 from simulator.geometry.ray_scene import CLEARANCE, facets_visible
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scattering.physical_optics import facet_transform, scattered
-from simulator.scene.array_antennas import array_sight
+from simulator.scene.array_antennas import array_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 
 POSITIONS = 260
@@ -110,7 +110,7 @@ def against_rays() -> None:
     scene = wall_scene()
     built = time.perf_counter() - begin
     positions = scene.scenario.base_station.element_positions
-    array = array_sight(scene.scenario, positions)
+    array = array_group(scene.scenario, positions)
     few = replace(array, positions=positions[:2])
     scattered_in_space(scene, few, few)  # compiles
     bare_rays(scene, positions[:2])
@@ -219,7 +219,7 @@ def against_frequencies() -> None:
 def peak_memory(scale: float) -> None:
     """Measure (d) the most memory that this process ever held, over all positions of a wall."""
     scene = wall_scene(scale=scale)
-    array = array_sight(scene.scenario, scene.scenario.base_station.element_positions)
+    array = array_group(scene.scenario, scene.scenario.base_station.element_positions)
     begin = time.perf_counter()
     scattered_in_space(scene, array, array)
     seconds = time.perf_counter() - begin

@@ -99,17 +99,19 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
     # of a million.
     least = noise * float(np.log(first_map.values.size / FALSE_ALARM))
     found: FittedWaves | None = None
-    left, this_map = uplink, first_map
+    residual, this_map = uplink, first_map
     while found is None or len(found.waves) < MOST_PATHS:
         peak = np.abs(this_map.values) ** 2
         row, column = np.unravel_index(int(np.argmax(peak)), peak.shape)
-        if peak[row, column] * left.samples.size < least:
+        if peak[row, column] * residual.samples.size < least:
             break
         before = _starts(found.waves) if found else []
         try:
-            start = _refined(left, float(this_map.aoa[row]), float(this_map.path_length[column]))
-            alone = fit_spherical_waves(left, [start])
-            share = alone.waves[0].explained * float(np.sum(np.abs(left.samples) ** 2)) / energy
+            start = _refined(
+                residual, float(this_map.aoa[row]), float(this_map.path_length[column])
+            )
+            alone = fit_spherical_waves(residual, [start])
+            share = alone.waves[0].explained * float(np.sum(np.abs(residual.samples) ** 2)) / energy
             if share < LEAST_SHARE:
                 break  # speckle
             # Each with its own curvature, whatever it is: less of the waves is left behind.
@@ -120,12 +122,12 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             found = joint
         except ValueError:
             break  # no maximum near the peak: a ridge, not a wave; or no second wave
-        left = replace(left, samples=found.left)
-        remaining = float(np.sum(np.abs(left.samples) ** 2)) - noise * left.samples.size
+        residual = replace(residual, samples=found.residual)
+        remaining = float(np.sum(np.abs(residual.samples) ** 2)) - noise * residual.samples.size
         if remaining < LEAST_SHARE * energy:
             break
         this_map = angle_range_map(
-            left, aoa=first_map.aoa, path_length=first_map.path_length, centre=np.zeros(3)
+            residual, aoa=first_map.aoa, path_length=first_map.path_length, centre=np.zeros(3)
         )
     if found is None:
         return NO_PATHS

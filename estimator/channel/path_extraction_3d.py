@@ -85,14 +85,14 @@ def find_space_paths(
     step = float(uplink.frequencies[1] - uplink.frequencies[0])
     cell = speed_of_light / float(np.ptp(uplink.frequencies))
     paths: list[SpacePath] = []
-    left, this_map = uplink, first_map
+    residual, this_map = uplink, first_map
     while len(paths) < MOST_PATHS:
         power = np.abs(this_map.values) ** 2
         i, j, k = np.unravel_index(int(np.argmax(power)), power.shape)
-        if power[i, j, k] * left.samples.size < least:
+        if power[i, j, k] * residual.samples.size < least:
             break
         length = float(this_map.path_length[k])
-        near = gated(left, length, reach=2 * array.half + 4 * cell)
+        near = gated(residual, length, reach=2 * array.half + 4 * cell)
         start = _best_lobe(near, array, (float(this_map.along[i]), float(this_map.up[j])), length)
         try:
             free = fit_wavefront(
@@ -105,18 +105,18 @@ def find_space_paths(
         except ValueError:
             break  # no summit near the peak: a ridge, not a wave
         # With its own curvature, whatever it is, less of the wave is left behind.
-        field = wavefront_field(left.positions, left.frequencies, free)
+        field = wavefront_field(residual.positions, residual.frequencies, free)
         share = float(np.vdot(field, field).real) / energy
         if share < LEAST_SHARE:
             break  # speckle
         paths.append(
             SpacePath(wave=wave, free=free, share=share, unambiguous=speed_of_light / step)
         )
-        left = replace(left, samples=left.samples - field)
-        remaining = float(np.sum(np.abs(left.samples) ** 2)) - noise * left.samples.size
+        residual = replace(residual, samples=residual.samples - field)
+        remaining = float(np.sum(np.abs(residual.samples) ** 2)) - noise * residual.samples.size
         if remaining < LEAST_SHARE * energy:
             break
-        this_map = direction_map(left, array, least_share=LEAST_SHARE, within=first_map)
+        this_map = direction_map(residual, array, least_share=LEAST_SHARE, within=first_map)
     return tuple(paths)
 
 

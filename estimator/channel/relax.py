@@ -95,9 +95,9 @@ def extract_paths(
     threshold = float(np.log(cells / false_alarm_rate))
     found: FittedWaves | None = None
     excess: list[float] = []
-    left = local
+    residual = local
     while len(excess) < most:
-        power, start = _strongest(left, angles, lengths)
+        power, start = _strongest(residual, angles, lengths)
         if power <= threshold:
             break
         before = found.waves if found else ()
@@ -110,8 +110,8 @@ def extract_paths(
             break
         found = candidate
         excess.append(10 * np.log10(power / threshold))
-        left = replace(local, samples=found.left)
-        if np.linalg.norm(found.left) <= 1e-9 * np.linalg.norm(local.samples):
+        residual = replace(local, samples=found.residual)
+        if np.linalg.norm(found.residual) <= 1e-9 * np.linalg.norm(local.samples):
             break  # nothing but rounding is left
     return _described(local, found, excess) if found else ()
 
@@ -159,10 +159,10 @@ def _in_array_frame(
 
 
 def _strongest(
-    left: Uplink, angles: Float[np.ndarray, " angles"], lengths: Float[np.ndarray, " ranges"]
+    residual: Uplink, angles: Float[np.ndarray, " angles"], lengths: Float[np.ndarray, " ranges"]
 ) -> tuple[float, WaveStart]:
     """Return the highest power over the mean of noise, and where it is."""
-    chart = angle_range_map(left, aoa=angles, path_length=lengths, centre=np.zeros(3))
+    chart = angle_range_map(residual, aoa=angles, path_length=lengths, centre=np.zeros(3))
     power = np.abs(chart.values) ** 2
     noise = mean_background(power)
     row, column = np.unravel_index(int(power.argmax()), power.shape)
@@ -190,8 +190,8 @@ def _coincide(uplink: Uplink, found: FittedWaves) -> bool:
 
 
 def _described(uplink: Uplink, found: FittedWaves, excess: list[float]) -> tuple[PathPeak, ...]:
-    power = float(np.vdot(found.left, found.left).real)
-    freedom = max(2 * found.left.size - 4 * len(found.waves), 1)
+    power = float(np.vdot(found.residual, found.residual).real)
+    freedom = max(2 * found.residual.size - 4 * len(found.waves), 1)
     # Half a circular variance is in either part.
     covariance = found.white * (2 * power / freedom)
     mean = 2 * np.pi * float(uplink.frequencies.mean()) / speed_of_light

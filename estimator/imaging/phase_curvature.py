@@ -65,7 +65,7 @@ def bent_intensities(
     return intensities
 
 
-def coherence(
+def coherence_factor(
     profiles: RangeProfiles,
     points: Float[np.ndarray, "points 3"],
     resolution: Resolution,

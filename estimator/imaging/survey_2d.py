@@ -10,7 +10,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.peak_detection import image_contrast, mean_background, significant_peaks
-from estimator.imaging.phase_curvature import bent_intensities, coherence
+from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
 
@@ -73,7 +73,9 @@ def survey(echo: Echo) -> Survey:
     across = frequency_taper(echo.frequencies, SURVEY_TAPER)
     profiles = range_profiles(echo, weights=across[None, :])
     by_shape = [
-        coherence(profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum()))
+        coherence_factor(
+            profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum())
+        )
         for flat in (False, True)
     ]
     return Survey(

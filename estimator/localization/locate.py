@@ -103,7 +103,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
             room.walls if room else (),
             resolution=echo_resolution(local_echo) if local_echo else NO_IMAGE,
             imaged=local_echo is not None,
-            loose=room.loose if room else np.zeros((0, 3)),
+            unassigned_peaks=room.unassigned_peaks if room else np.zeros((0, 3)),
             wall_covariance=room.joint_covariance if room else None,
             clock_known=clock_known,
             reach=echo_reach(local_echo)[1] if local_echo else np.inf,

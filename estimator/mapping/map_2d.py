@@ -15,7 +15,7 @@ from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
-from estimator.walls.wall_detection_2d import detect_mirrors, loose_peaks
+from estimator.walls.wall_detection_2d import detect_mirrors, unassigned_peaks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,9 @@ class RoomMap:
     """Of all walls' (angle [rad], offset [m]), one wall after the other: walls that are folded
     about the same mirror err together."""
     targets: tuple[Target, ...]  # what is no mirror, at its true place
-    loose: Float[np.ndarray, "peaks 3"]  # peaks on no wall and behind none, strongest first [m]
+    unassigned_peaks: Float[
+        np.ndarray, "peaks 3"
+    ]  # peaks on no wall and behind none, strongest first [m]
     survey: Survey
 
 
@@ -56,7 +58,7 @@ def build_room_map(echo: Echo) -> RoomMap:
         seen_through=folded.seen_through,
         joint_covariance=folded.covariance,
         targets=find_targets(looked, folded, found, resolution, aperture),
-        loose=loose_peaks(echo, looked, found),
+        unassigned_peaks=unassigned_peaks(echo, looked, found),
         survey=looked,
     )
 

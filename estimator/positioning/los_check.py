@@ -51,7 +51,7 @@ def doubt_straight_way(
     -------
     The answer, or that it is ambiguous and why, with the place over an unseen wall.
     """
-    mirror = unseen_mirror(wave.aoa, wave.path_length, room.loose, room.resolution)
+    mirror = unseen_mirror(wave.aoa, wave.path_length, room.unassigned_peaks, room.resolution)
     if mirror is not None:
         place = project(wave.aoa, wave.path_length, [mirror], covariance=wave.covariance)
         other = replace(
@@ -70,7 +70,7 @@ def doubt_straight_way(
             other,
         )
     thing = what_stands_in_the_way(
-        wave.aoa, wave.path_length, room.loose, room.resolution.across_ray
+        wave.aoa, wave.path_length, room.unassigned_peaks, room.resolution.across_ray
     )
     if thing is not None:
         return _doubted(
@@ -123,7 +123,10 @@ def _doubted(answer: UserEstimate, reason: str, *others: UserEstimate) -> UserEs
 
 
 def unseen_mirror(
-    aoa: float, path_length: float, loose: Float[np.ndarray, "peaks 3"], resolution: Resolution
+    aoa: float,
+    path_length: float,
+    unassigned_peaks: Float[np.ndarray, "peaks 3"],
+    resolution: Resolution,
 ) -> Wall | None:
     """Return a wall between two loose points that the ray meets before its end, if there is one.
 
@@ -136,7 +139,7 @@ def unseen_mirror(
     resolution
         Of the image: the peaks are known to a part of a cell, and so is the wall.
     """
-    points = loose[:LOOSE_PEAKS]
+    points = unassigned_peaks[:LOOSE_PEAKS]
     towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         hit = crossing(np.zeros(3), towards, points[first], points[second])
@@ -158,7 +161,7 @@ def _wall_between(
 
 
 def what_stands_in_the_way(
-    aoa: float, path_length: float, loose: Float[np.ndarray, "peaks 3"], cell: float
+    aoa: float, path_length: float, unassigned_peaks: Float[np.ndarray, "peaks 3"], cell: float
 ) -> Float[np.ndarray, " 3"] | None:
     """Return the strongest loose point that stands on the ray before its end, if there is one.
 
@@ -171,10 +174,10 @@ def what_stands_in_the_way(
     cell
         Resolution of the image across a ray, as an angle. [rad]
     """
-    if not len(loose):
+    if not len(unassigned_peaks):
         return None
     towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    ahead = loose @ towards
-    beside = np.linalg.norm(loose - ahead[:, None] * towards, axis=-1)
+    ahead = unassigned_peaks @ towards
+    beside = np.linalg.norm(unassigned_peaks - ahead[:, None] * towards, axis=-1)
     on_it = (ahead > 0) & (ahead < path_length - USER_SIZE) & (beside < BESIDE * cell * ahead)
-    return loose[int(np.argmax(on_it))] if on_it.any() else None
+    return unassigned_peaks[int(np.argmax(on_it))] if on_it.any() else None

@@ -17,7 +17,9 @@ class Surroundings:
     wall_covariance: Float[np.ndarray, "parameters parameters"]  # of all walls' (angle, offset)
     resolution: Resolution  # of the image: how well it tells where a wall ends
     imaged: bool  # whether there was an echo: without, nothing is known of mirrors
-    loose: Float[np.ndarray, "peaks 3"]  # peaks of the image on no wall, strongest first [m]
+    unassigned_peaks: Float[
+        np.ndarray, "peaks 3"
+    ]  # peaks of the image on no wall, strongest first [m]
     reach: float  # how far the image shows what there is [m]
     widest: float  # sine of the angle from boresight to which it does [-]
     contrast: float  # intensity of the brightest in the image over its background [-]

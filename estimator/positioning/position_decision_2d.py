@@ -47,7 +47,7 @@ def decide(
     *,
     resolution: Resolution,
     imaged: bool,
-    loose: Float[np.ndarray, "peaks 3"],
+    unassigned_peaks: Float[np.ndarray, "peaks 3"],
     wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
     clock_known: bool = True,
     reach: float = np.inf,
@@ -96,7 +96,7 @@ def decide(
         wall_covariance=block_covariance(walls) if wall_covariance is None else wall_covariance,
         resolution=resolution,
         imaged=imaged,
-        loose=loose,
+        unassigned_peaks=unassigned_peaks,
         reach=reach,
         widest=widest,
         contrast=contrast,
@@ -249,7 +249,7 @@ def _energy(consensus: Consensus, found: PathSet) -> float:
 def _most_explained(consistent: Sequence[Consensus], found: PathSet, chains: Chains) -> Consensus:
     def rank(one: Consensus) -> tuple[float, int, float]:
         straight = sum(chains[seen.path][0] == seen.chain for seen in one.sightings)
-        return round(_energy(one, found), 9), straight, -one.mismatch
+        return round(_energy(one, found), 9), straight, -one.chi_square
 
     return max(consistent, key=rank)
 

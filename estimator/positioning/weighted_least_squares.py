@@ -47,7 +47,7 @@ class Consensus:
     sightings: tuple[Sighting, ...]
     position: Float[np.ndarray, " 3"]  # [m]
     covariance: Float[np.ndarray, "3 3"]  # [m²]
-    mismatch: float  # weighted square of what is left over [-]
+    chi_square: float  # weighted square of what is left over [-]
     freedom: int  # observations beyond the unknowns
     clock_offset: float | None  # of the user; None where it was not solved for [s]
     clock_deviation: float | None  # [s]
@@ -55,7 +55,7 @@ class Consensus:
     @property
     def agrees(self) -> bool:
         """Whether all paths can be of one user at this position."""
-        return self.freedom == 0 or self.mismatch < float(chi2.ppf(AGREE, self.freedom))
+        return self.freedom == 0 or self.chi_square < float(chi2.ppf(AGREE, self.freedom))
 
 
 def block_covariance(walls: Sequence[Wall]) -> Float[np.ndarray, "parameters parameters"]:
@@ -122,7 +122,7 @@ def solve_position(
         sightings=tuple(sightings),
         position=np.append(unknowns[:2], 0.0),
         covariance=square,
-        mismatch=float(rest @ rest),
+        chi_square=float(rest @ rest),
         freedom=len(values) - len(unknowns),
         clock_offset=float(unknowns[2]) / speed_of_light if unknown_clock else None,
         clock_deviation=float(np.sqrt(spread[2, 2])) / speed_of_light if unknown_clock else None,

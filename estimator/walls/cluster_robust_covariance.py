@@ -29,7 +29,7 @@ cuts but for rounding, which must not decide. [parts]"""
 def clustered_covariance(
     places: Float[np.ndarray, " places"],
     designs: Float[np.ndarray, "places parameters"],
-    pushes: Float[np.ndarray, " places"],
+    scores: Float[np.ndarray, " places"],
     gains: Float[np.ndarray, "places parameters"],
     *,
     part: float,
@@ -68,7 +68,7 @@ def clustered_covariance(
     covariance = np.zeros_like(root)
     for shift in (0.0, 0.5):
         first = _first_of_parts(np.minimum(position + shift, count + shift - 2 * TIE))
-        pushed = np.add.reduceat(pushes[:, None] * designs, first)
+        pushed = np.add.reduceat(scores[:, None] * designs, first)
         held = np.add.reduceat(designs[:, :, None] * gains[:, None, :], first)
         shares, axes = np.linalg.eigh(root @ (0.5 * (held + held.swapaxes(1, 2))) @ root)
         left = np.maximum(1 - shares, LEAST_LEFT)

@@ -50,14 +50,16 @@ def find_lines(
     Segments, each with at least :data:`FEWEST_INLIERS` peaks; none uses another's peaks.
     """
     found: list[LineCandidate] = []
-    left = peaks
-    while len(left) >= FEWEST_INLIERS and len(found) < most:
-        candidate, members = _best_line(left, resolution)
+    unassigned = peaks
+    while len(unassigned) >= FEWEST_INLIERS and len(found) < most:
+        candidate, members = _best_line(unassigned, resolution)
         if candidate is None:
             break
         found.append(candidate)
         # The line's own peaks go, and the skirt of sidelobes beside it.
-        left = left[~(members | _on_segment(left, candidate, resolution, tolerance=2.0))]
+        unassigned = unassigned[
+            ~(members | _on_segment(unassigned, candidate, resolution, tolerance=2.0))
+        ]
     return tuple(found)
 
 

@@ -133,27 +133,27 @@ def fit_coherently(
         gram[np.diag_indices(len(gram))] += RIDGE * np.trace(gram).real / len(gram)
         solved = cho_factor(gram, lower=True, overwrite_a=True)
         all_strengths = cho_solve(solved, _adjoint(echoes, data))
-        left = data - echoes @ all_strengths
+        residual = data - echoes @ all_strengths
         strengths = all_strengths[:count]
         moved = slopes @ np.stack([strengths, strengths * levers], axis=-1)
         moved -= echoes @ cho_solve(solved, _adjoint(echoes, moved))
         stiffness = (moved.conj().T @ moved).real
-        step = np.linalg.solve(stiffness, (moved.conj().T @ left).real)
+        step = np.linalg.solve(stiffness, (moved.conj().T @ residual).real)
         start, end = _moved(start, end, step)
         if max(np.linalg.norm(start - first[0]), np.linalg.norm(end - first[1])) > (
             FARTHEST_STEP * cell_across
         ):
             return None
-    pushes = (strengths.conj() * _adjoint(slopes, left)).real
+    scores = (strengths.conj() * _adjoint(slopes, residual)).real
     gains = (strengths.conj()[:, None] * _adjoint(slopes, moved)).real
     designs = np.stack([np.ones_like(levers), levers], axis=-1)
     # Of (offset, displacement of the ends).
-    by_step = clustered_covariance(places, designs, pushes, gains, part=PART * cell_along)
+    by_step = clustered_covariance(places, designs, scores, gains, part=PART * cell_along)
     # An end that moves along the normal by δ turns the line by −2δ over its length.
     to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
     covariance = to_angle @ by_step @ to_angle.T
     covariance[1, 1] += DEPTH**2
-    explained = 1 - float(np.vdot(left, left).real / np.vdot(data, data).real)
+    explained = 1 - float(np.vdot(residual, residual).real / np.vdot(data, data).real)
     return CoherentLine(start=start, end=end, covariance=covariance, explained=explained)
 
 

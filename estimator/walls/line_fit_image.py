@@ -238,8 +238,8 @@ def _summit_of(
     inertia = float(np.sum(weights * curvatures * levers**2))
     if curvature >= 0 or inertia >= 0:
         return None
-    pushes = slopes - curvatures * float(slopes @ weights) / curvature
-    at_rest, tilting = _slow_power(pushes, levers, weights)
+    scores = slopes - curvatures * float(slopes @ weights) / curvature
+    at_rest, tilting = _slow_power(scores, levers, weights)
     tilt_variance = TILT_SHARE * tilting * np.sum((weights * levers) ** 2) / inertia**2
     offset_variance = OFFSET_SHARE * at_rest * np.sum(weights**2) / curvature**2
     covariance = np.diag([tilt_variance, offset_variance])
@@ -247,7 +247,7 @@ def _summit_of(
 
 
 def _slow_power(
-    pushes: Float[np.ndarray, " places"],
+    scores: Float[np.ndarray, " places"],
     across: Float[np.ndarray, " places"],
     weights: Float[np.ndarray, " places"],
 ) -> tuple[float, float]:
@@ -262,10 +262,10 @@ def _slow_power(
     weights
         Of the places in the fit.
     """
-    count = min(MODES, max(4, len(pushes) // (2 * SUMMIT_SAMPLES_PER_CELL)))
+    count = min(MODES, max(4, len(scores) // (2 * SUMMIT_SAMPLES_PER_CELL)))
     polynomials = np.polynomial.legendre.legvander(across, count - 1)
     modes = np.linalg.qr(polynomials * weights[:, None])[0]
-    powers = (modes.T @ pushes) ** 2
+    powers = (modes.T @ scores) ** 2
     slopes = np.sqrt(np.sum(np.gradient(modes, across, axis=0) ** 2, axis=0))
     # Powers are χ² distributed about a line over the slope: the likeliest of a few rises.
     likeliest = None
@@ -276,5 +276,5 @@ def _slow_power(
         if likeliest is None or cost < likeliest[0]:
             likeliest = (cost, level * float(shape[0]), level * float(shape[1]))
     assert likeliest is not None
-    least = LEAST_POWER * float(np.mean(pushes**2))
+    least = LEAST_POWER * float(np.mean(scores**2))
     return max(likeliest[1], least), max(likeliest[2], least)

@@ -63,23 +63,23 @@ def find_planes(
     Planes; none uses another's peaks.
     """
     found: list[PlaneCandidate] = []
-    left, refused = peaks, 0
+    unassigned, refused = peaks, 0
     # The same peaks give the same planes: the draws are a part of the search, not of chance.
     rng = np.random.default_rng(0)
-    while len(left) >= FEWEST_INLIERS and refused < 3:
-        members = _best_plane(left, resolution, (depth, width), rng)
+    while len(unassigned) >= FEWEST_INLIERS and refused < 3:
+        members = _best_plane(unassigned, resolution, (depth, width), rng)
         if members is None:
             break
-        members = _largest_patch(left, members, resolution)
-        chosen = left[members]
+        members = _largest_patch(unassigned, members, resolution)
+        chosen = unassigned[members]
         if len(chosen) < FEWEST_INLIERS:
             refused += 1
-            left = left[~members]
+            unassigned = unassigned[~members]
             continue
         centre, normal = _fitted(chosen)
         found.append(PlaneCandidate(centre=centre, normal=normal, members=chosen))
-        near = _near(left, centre[None], normal[None], resolution, 2 * TOLERANCE)[0]
-        left = left[~(members | (near & _beside(left, chosen, resolution)))]
+        near = _near(unassigned, centre[None], normal[None], resolution, 2 * TOLERANCE)[0]
+        unassigned = unassigned[~(members | (near & _beside(unassigned, chosen, resolution)))]
     return tuple(found)
 
 

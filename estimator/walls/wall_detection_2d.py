@@ -224,7 +224,7 @@ def _to_its_ends(
     return line if shorter is None else replace(shorter, confidence=line.confidence)
 
 
-def loose_peaks(
+def unassigned_peaks(
     echo: Echo, looked: Survey, lines: Sequence[FittedLine]
 ) -> Float[np.ndarray, "peaks 3"]:
     """Return the survey's peaks that lie neither on a wall nor behind one, strongest first."""

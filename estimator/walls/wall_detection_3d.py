@@ -98,25 +98,25 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
             if not any(_same(plane.wall, other.wall, coarse) for other in found):
                 found.append(plane)
                 head_on.append(True)
-    left = looked.peaks[~_explained(looked.peaks, found, coarse)]
+    unassigned = looked.peaks[~_explained(looked.peaks, found, coarse)]
     # One after the other: a wall that is followed to its ends takes more peaks than it began with.
     depth = float(looked.ranges[-1] - looked.ranges[0])
     width = 2 * float(looked.along[-1])
-    while candidates := find_planes(left, coarse, depth=depth, width=width):
+    while candidates := find_planes(unassigned, coarse, depth=depth, width=width):
         candidate = candidates[0]
         normal = towards_array(candidate.centre, candidate.normal)
         start = _around(candidate.members, candidate.centre, plane_axes(normal))
         wall = refine_plane(sharp, start, fine)
         plane = None if wall is None else followed(wall)
         again = None if plane is None else refine_plane(sharp, plane.wall, fine)
-        used = _among(left, candidate.members)
+        used = _among(unassigned, candidate.members)
         if plane is not None and again is not None and plane.confidence >= LEAST_CONFIDENCE:
             plane = replace(plane, wall=again)
-            used |= _explained(left, [plane], coarse)
+            used |= _explained(unassigned, [plane], coarse)
             if not any(_same(plane.wall, other.wall, coarse) for other in found):
                 found.append(plane)
                 head_on.append(False)
-        left = left[~used]
+        unassigned = unassigned[~used]
     order: list[int] = []
     for i in sorted(range(len(found)), key=lambda i: -found[i].level):
         stronger = [found[j].wall for j in order]

@@ -47,7 +47,7 @@ class WavefrontError:
 
 
 def wavefront_error(
-    left: Complex[np.ndarray, "elements freqs"],
+    residual: Complex[np.ndarray, "elements freqs"],
     wave: Complex[np.ndarray, "elements freqs"],
     noise: float,
 ) -> WavefrontError:
@@ -69,7 +69,7 @@ def wavefront_error(
     count = wave.shape[1]
     size = np.abs(wave)
     level = float(np.sqrt(np.mean(size**2)))
-    turned = left * np.conj(wave) / (np.maximum(size, 1e-12 * level) * level)
+    turned = residual * np.conj(wave) / (np.maximum(size, 1e-12 * level) * level)
     falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     bands = np.stack([turned.mean(axis=1), (turned * falling).mean(axis=1)])
     # Antennas' gain and the wave's spreading vary over the band by a factor that all elements

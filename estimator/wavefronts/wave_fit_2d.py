@@ -59,7 +59,7 @@ class FittedWaves:
     waves: tuple[SphericalWave, ...]  # in the order of their starts
     covariance: Float[np.ndarray, "all all"]  # of all parameters, wave after wave
     white: Float[np.ndarray, "all all"]  # the same for a unit variance of white noise alone
-    left: Complex[np.ndarray, "elements freqs"]  # the pilot less all waves [-]
+    residual: Complex[np.ndarray, "elements freqs"]  # the pilot less all waves [-]
 
 
 def wave_field(
@@ -151,7 +151,7 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
                     f"no peak within two main lobes of {np.degrees(start.aoa):.3f}°, "
                     f"{start.path_length:.4f} m"
                 )
-        noise = np.sqrt(np.mean(np.abs(state.left) ** 2) / 2)
+        noise = np.sqrt(np.mean(np.abs(state.residual) ** 2) / 2)
         floor = 1e-7 * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
         deviations = np.split(np.sqrt(np.diag(bread)), state.bounds)
         done = all(
@@ -173,7 +173,7 @@ class _Linear:
     slopes: tuple[Float[np.ndarray, "elements _"], ...]  # of its length by its parameters
     normal: Float[np.ndarray, "all all"]  # JᵀJ
     scores: Float[np.ndarray, "elements all"]  # each element's Jᵀe
-    left: Complex[np.ndarray, "elements freqs"]
+    residual: Complex[np.ndarray, "elements freqs"]
     bounds: list[int]  # where the columns of one wave end
 
 
@@ -225,14 +225,14 @@ def _linearised(
     except np.linalg.LinAlgError:
         raise ValueError("two waves became one") from None
     fields = tuple(gain * unit for gain, unit in zip(gains, units, strict=True))
-    left = uplink.samples - sum(fields)
+    residual = uplink.samples - sum(fields)
     slopes = tuple(_slopes(uplink, values) for values in parameters)
     # With J = wave·(1, j, −jk·slope), JᵀJ and Jᵀe separate into sums over frequency.
     powers = wavenumbers[:, None] ** np.arange(3)
     columns = [_columns(one) for one in slopes]
     scores = []
     for field, (shape, order) in zip(fields, columns, strict=True):
-        matched = (np.conj(field) * left) @ powers[:, :2]
+        matched = (np.conj(field) * residual) @ powers[:, :2]
         scores.append((np.conj(shape) * matched[:, order]).real)
     ends = np.cumsum([shape.shape[1] for shape, _ in columns])
     sums = powers.sum(axis=0)
@@ -261,7 +261,7 @@ def _linearised(
         slopes=slopes,
         normal=normal,
         scores=np.concatenate(scores, axis=1),
-        left=left,
+        residual=residual,
         bounds=[int(end) for end in ends[:-1]],
     )
 
@@ -310,13 +310,13 @@ def _described(
     state: _Linear,
 ) -> FittedWaves:
     bread = _inverse(state.normal, starts)
-    noise = noise_variance(state.left)
+    noise = noise_variance(state.residual)
     meat = 0.5 * noise * state.normal
     ends = [*state.bounds, len(bread)]
     count = wavenumbers.size
     falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     for field, slopes, end in zip(state.fields, state.slopes, ends, strict=True):
-        error = wavefront_error(state.left, field, noise)
+        error = wavefront_error(state.residual, field, noise)
         # What an error of the phase alone does to Jᵀe: it has the columns' part along j·wave.
         power = np.abs(field) * np.sqrt(np.mean(np.abs(field) ** 2))
         for variance, shape in ((error.mean, np.ones(count)), (error.slope, falling)):
@@ -349,5 +349,5 @@ def _described(
         waves=tuple(waves),
         covariance=covariance,
         white=0.5 * bread[np.ix_(keep, keep)],
-        left=state.left,
+        residual=state.residual,
     )

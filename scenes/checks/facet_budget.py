@@ -8,14 +8,13 @@ import numpy as np
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate, largest_size, smallest_size
 from scenes.schema.roughness import LARGEST_RELATIVE_RMS
-from scenes.surfaces.facet_spacing import facet_count, facet_spacing, mesh_facet_count
-
-BYTES_PER_FACET = 128
-"""What a facet takes: two vertices or their share, centre, normal, size, field [byte]."""
-
-
-MOST_BYTES = 16 * 2**30
-"""What the facets of a scenario may take in all [byte]."""
+from scenes.surfaces.facet_spacing import (
+    BYTES_PER_FACET,
+    MOST_BYTES,
+    facet_count,
+    facet_spacing,
+    mesh_facet_count,
+)
 
 
 def facet_counts(

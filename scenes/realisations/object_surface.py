@@ -17,13 +17,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
-from scenes.checks.facet_budget import BYTES_PER_FACET, MOST_BYTES
 from scenes.random_streams import random_stream
 from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.errors import did_you_mean
 from scenes.schema.materials import Slab
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
-from scenes.surfaces.facet_spacing import facet_count
+from scenes.surfaces.facet_spacing import BYTES_PER_FACET, MOST_BYTES, facet_count
 from scenes.surfaces.heights import Heights
 from scenes.surfaces.primitives import in_reach, shape_in_reach, upright_shape
 from scenes.surfaces.tiled_faces import Reach

@@ -13,6 +13,11 @@ FACETS_PER_CORRELATION_LENGTH = 4
 FACETS_PER_CUTOFF = 2
 """Facets per inner cut-off: what an exponential spectrum has beyond is below e^(-π²) [-]."""
 
+BYTES_PER_FACET = 128
+"""What a facet takes: two vertices or their share, centre, normal, size, field [byte]."""
+
+MOST_BYTES = 16 * 2**30
+"""What the facets of a scenario may take in all [byte]."""
 
 FEWEST_ROUND = 64
 """Fewest lines around a cylinder, however coarse the spacing: 6° each [-]."""

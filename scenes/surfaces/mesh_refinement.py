@@ -11,12 +11,11 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from scenes.checks.facet_budget import BYTES_PER_FACET, MOST_BYTES
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.meshes.triangle_mesh import TriangleMesh
 from scenes.schema.errors import ScenarioError
 from scenes.schema.objects import MeshFile
-from scenes.surfaces.facet_spacing import mesh_facet_count
+from scenes.surfaces.facet_spacing import BYTES_PER_FACET, MOST_BYTES, mesh_facet_count
 from scenes.surfaces.heights import Heights
 from scenes.surfaces.shape import Shape
 

@@ -19,7 +19,7 @@ LEVEL = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sight:
+class AntennaGroup:
     """Equal antennas that look in parallel, close together."""
 
     positions: Float[np.ndarray, "antennas 3"]  # [m]
@@ -59,7 +59,7 @@ class Sight:
 
 
 def in_reach(
-    pairs: Sequence[tuple[Sight, Sight]],
+    pairs: Sequence[tuple[AntennaGroup, AntennaGroup]],
     centres: Float[np.ndarray, "spheres 3"],
     radius: float,
     *,

@@ -26,7 +26,7 @@ from scipy.constants import speed_of_light
 from scipy.spatial import KDTree
 
 from simulator.antennas.antenna_pattern import ISOTROPIC
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
@@ -61,7 +61,7 @@ for a scattering centre. [-]"""
 
 
 def diffuse_echo(
-    scene: RadioScene, send: Sight, receive: Sight
+    scene: RadioScene, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum the echoes of hidden and lit targets of which at least one way is diffuse.
 
@@ -111,8 +111,8 @@ class _Target:
         one: DiffuseLeg,
         other: Leg,
         partners: Sequence[DiffuseLeg],
-        send: Sight,
-        receive: Sight,
+        send: AntennaGroup,
+        receive: AntennaGroup,
     ) -> Complex[np.ndarray, "links freqs"]:
         """Sum diffuse-coherent echoes over two legs, both ways for equal ends, and diffuse ones."""
         frequencies = self.scene.scenario.radio.frequencies
@@ -121,7 +121,7 @@ class _Target:
         centre = self._centre(ends[0], ends[1])
         if centre is None:
             return echo
-        there = Sight(positions=centre[None], pattern=ISOTROPIC)
+        there = AntennaGroup(positions=centre[None], pattern=ISOTROPIC)
         coherent = self._coherent(other, receive, centre)
         partners = [
             two
@@ -155,7 +155,7 @@ class _Target:
         return echo
 
     def _wave(
-        self, chain: DiffuseLeg, sight: Sight, there: Sight, answer: "_Answer"
+        self, chain: DiffuseLeg, sight: AntennaGroup, there: AntennaGroup, answer: "_Answer"
     ) -> Complex[np.ndarray, "links freqs"]:
         wave: np.ndarray = diffuse_wave(
             self.scene,
@@ -194,7 +194,7 @@ class _Target:
         return centre
 
     def _coherent(
-        self, leg: Leg, sight: Sight, centre: Float[np.ndarray, " 3"]
+        self, leg: Leg, sight: AntennaGroup, centre: Float[np.ndarray, " 3"]
     ) -> Complex[np.ndarray, "links freqs"] | None:
         """Work out the wave over a leg of mirrors at the centre; none where it does not lead."""
         frequencies = self.scene.scenario.radio.frequencies

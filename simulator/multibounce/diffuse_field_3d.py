@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 
-from simulator.antennas.beam_culling import Sight, in_reach
+from simulator.antennas.beam_culling import AntennaGroup, in_reach
 from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
@@ -54,8 +54,8 @@ LOSS_NODES = 2
 def diffuse_wave(
     scene: RadioScene,
     chain: DiffuseLeg,
-    array: Sight,
-    other: Sight,
+    array: AntennaGroup,
+    other: AntennaGroup,
     *,
     beside: str | None = None,
     factor: Factor | None = None,
@@ -167,7 +167,7 @@ def _product(
 
 
 def facets_within_reach(
-    scene: RadioScene, chain: DiffuseLeg, near: Sight, far: Sight
+    scene: RadioScene, chain: DiffuseLeg, near: AntennaGroup, far: AntennaGroup
 ) -> Int[np.ndarray, " some"]:
     """Find the rough mirror's facets that both patterns reach, tile by tile."""
     among, facets = scene.mirrors, scene.facets
@@ -226,7 +226,9 @@ class _Tiles:
         return numbers
 
 
-def _may_lead_there(mirrors: Mirrors, chain: DiffuseLeg, near: Sight, far: Sight) -> bool:
+def _may_lead_there(
+    mirrors: Mirrors, chain: DiffuseLeg, near: AntennaGroup, far: AntennaGroup
+) -> bool:
     """Tell whether any tile of the rough mirror can be within both beams, whoever sees it."""
     if not chain.before.bounces and not chain.after.bounces:
         return True  # each facet is looked at, anyway
@@ -236,7 +238,11 @@ def _may_lead_there(mirrors: Mirrors, chain: DiffuseLeg, near: Sight, far: Sight
 
 
 def _leads_there(
-    scene: RadioScene, chain: DiffuseLeg, array: Sight, other: Sight, some: Int[np.ndarray, " some"]
+    scene: RadioScene,
+    chain: DiffuseLeg,
+    array: AntennaGroup,
+    other: AntennaGroup,
+    some: Int[np.ndarray, " some"],
 ) -> bool:
     """Tell whether both ends see a place on the rough mirror within their beams, by samples."""
     if scene.facets is None:
@@ -246,7 +252,7 @@ def _leads_there(
     few = scene.facets.part(some[:: max(1, some.size // MOST_SAMPLES)])
     tiles = cut_into_patches(few, np.arange(few.count), SAMPLE_SIDE)
     points = few.centres[tiles.order[tiles.first[:-1]]]
-    corners = Sight(positions=array.outline, pattern=array.pattern)
+    corners = AntennaGroup(positions=array.outline, pattern=array.pattern)
     seen = [
         _traced(scene, chain, leg, sight, points).any(axis=0)
         for leg, sight in ((chain.after, other), (chain.before, corners))
@@ -261,7 +267,7 @@ def _traced(
     scene: RadioScene,
     chain: DiffuseLeg,
     leg: Leg,
-    sight: Sight,
+    sight: AntennaGroup,
     points: Float[np.ndarray, "points 3"],
 ) -> Bool[np.ndarray, "antennas points"]:
     """Trace rays over a leg to places on a rough mirror."""
@@ -306,7 +312,7 @@ def _on_mean_plane(facets: Facets, mirrors: Mirrors, mirror: int) -> Facets:
 
 
 def _look(
-    scene: RadioScene, chain: DiffuseLeg, leg: Leg, sight: Sight, *, beside: str | None
+    scene: RadioScene, chain: DiffuseLeg, leg: Leg, sight: AntennaGroup, *, beside: str | None
 ) -> Look:
     if leg.sequence:
         return partial(_look_over_mirrors, scene, chain, leg, sight)
@@ -328,7 +334,7 @@ def _look_over_mirrors(
     scene: RadioScene,
     chain: DiffuseLeg,
     leg: Leg,
-    sight: Sight,
+    sight: AntennaGroup,
     some: Int[np.ndarray, " some"],
 ) -> Seen:
     """Trace one facet of each small patch over a leg, from every antenna."""

@@ -22,7 +22,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from simulator.antennas.beam_culling import LEVEL, Sight, in_reach
+from simulator.antennas.beam_culling import LEVEL, AntennaGroup, in_reach
 from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
@@ -45,7 +45,7 @@ rays are lifted off their mirrors, and along no edge of a usual room. [m]"""
 
 
 def echo_over_mirrors(
-    scene: RadioScene, send: Sight, receive: Sight
+    scene: RadioScene, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum the echoes over two and more surfaces, up to the scenario's ``max_bounces``.
 
@@ -56,7 +56,7 @@ def echo_over_mirrors(
 
 
 def coherent_echo(
-    scene: RadioScene, send: Sight, receive: Sight
+    scene: RadioScene, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum the coherent part of the echoes over two and more surfaces.
 
@@ -105,8 +105,8 @@ class _Target:
     scene: RadioScene
     mirrors: Mirrors
     facets: Facets  # its own
-    send: Sight
-    receive: Sight
+    send: AntennaGroup
+    receive: AntennaGroup
 
     def echo(self, out: Leg, back: Leg) -> Complex[np.ndarray, "links freqs"]:
         """Sum what the target scatters from one leg into another."""
@@ -159,7 +159,7 @@ class _Target:
     def _seen(
         self,
         leg: Leg,
-        sight: Sight,
+        sight: AntennaGroup,
         order: Int[np.ndarray, " facets"],
         first: Int[np.ndarray, " patches_and_one"],
     ) -> Bool[np.ndarray, "links patches"]:
@@ -201,7 +201,7 @@ def _look_up(
 
 
 def _over_mirrors_alone(
-    scene: RadioScene, among: SceneMirrors, send: Sight, receive: Sight
+    scene: RadioScene, among: SceneMirrors, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum the chains that return to the array over two and more mirrors, and no target."""
     frequencies = scene.scenario.radio.frequencies

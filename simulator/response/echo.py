@@ -12,7 +12,7 @@ from simulator.multibounce.multibounce_2d import SeveralProgress, ghost_echo, un
 from simulator.multibounce.multibounce_3d import echo_over_mirrors
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scattering.physical_optics import scattered
-from simulator.scene.array_antennas import array_sight, in_space, sending_sight
+from simulator.scene.array_antennas import array_group, in_space, sending_group
 from simulator.scene.radio_scene import RadioScene, antenna_pattern, facet_ports
 
 
@@ -45,8 +45,8 @@ def simulate_echo(
     if scene.facets is not None and scenario.base_station.multistatic:
         return _link_by_link(scene, scene.facets, advance)
     if in_space(scenario):
-        array_there = array_sight(scenario, scene.elements)
-        senders_there = sending_sight(scenario, scene.elements) or array_there
+        array_there = array_group(scenario, scene.elements)
+        senders_there = sending_group(scenario, scene.elements) or array_there
         over_one = scattered_in_space(scene, senders_there, array_there, advance=advance)
         return np.asarray(over_one + echo_over_mirrors(scene, senders_there, array_there))
     if array is None or scene.facets is None:

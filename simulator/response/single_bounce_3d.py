@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex
 
-from simulator.antennas.beam_culling import Sight, in_reach
+from simulator.antennas.beam_culling import AntennaGroup, in_reach
 from simulator.antennas.links import Links
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
@@ -13,7 +13,11 @@ from simulator.visibility.shaft_culling import Sightlines, object_shape, scenari
 
 
 def scattered_in_space(
-    scene: RadioScene, send: Sight, receive: Sight, *, advance: Callable[[], None] = lambda: None
+    scene: RadioScene,
+    send: AntennaGroup,
+    receive: AntennaGroup,
+    *,
+    advance: Callable[[], None] = lambda: None,
 ) -> Complex[np.ndarray, "links freqs"]:
     """Sum what the facets scatter from one or several antennas to each of the array.
 
@@ -47,7 +51,7 @@ def scattered_in_space(
     return spectrum
 
 
-def sightlines(scene: RadioScene, send: Sight, receive: Sight) -> Sightlines:
+def sightlines(scene: RadioScene, send: AntennaGroup, receive: AntennaGroup) -> Sightlines:
     """Tell what links see of a scene's facets."""
     if scene.facets is None:
         raise ValueError("the scene has no facets; give a scene with a scattering object")

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Complex
 
 from scenes.scenario import User
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import blocked
@@ -15,7 +15,7 @@ from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scattering.physical_optics import scattered
-from simulator.scene.array_antennas import array_sight, in_space, user_sight
+from simulator.scene.array_antennas import array_group, in_space, user_group
 from simulator.scene.radio_scene import RadioScene, facet_ports
 from simulator.specular.diffuse_chains import diffuse_legs
 from simulator.specular.free_space import direct_wave
@@ -58,8 +58,8 @@ def simulate_uplink(
     if in_space(scene.scenario):
         name = next(name for name, one in scene.scenario.users.items() if one is user)
         sender, array_there = (
-            user_sight(scene.scenario, name),
-            array_sight(scene.scenario, scene.elements),
+            user_group(scene.scenario, name),
+            array_group(scene.scenario, scene.elements),
         )
         over_one = scattered_in_space(scene, sender, array_there, advance=advance)
         over_more_there = _over_mirrors(scene, sender, array_there)
@@ -108,7 +108,7 @@ def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freq
 
 
 def _over_mirrors(
-    scene: RadioScene, sender: Sight, array: Sight
+    scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
 ) -> Complex[np.ndarray, "elements freqs"]:
     """Sum the specular paths over two and more mirrors, in space."""
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
@@ -139,7 +139,7 @@ def _over_mirrors(
 
 
 def _diffuse_over_mirrors(
-    scene: RadioScene, sender: Sight, array: Sight
+    scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
 ) -> Complex[np.ndarray, "elements freqs"]:
     """Sum what any one rough mirror of two and more scatters diffusely, in space."""
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces

@@ -11,7 +11,7 @@ from scenes.scenario import Scenario
 from scenes.schema.antenna import Antenna
 from scenes.surfaces.tiled_faces import Reach
 from simulator.antennas.antenna_pattern import ISOTROPIC, AntennaPattern
-from simulator.antennas.beam_culling import Sight, in_reach
+from simulator.antennas.beam_culling import AntennaGroup, in_reach
 from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg
 from simulator.specular.image_sources import DIRECT, Leg
 
@@ -21,23 +21,25 @@ def in_space(scenario: Scenario) -> bool:
     return scenario.dimensions == 3 and not scenario.base_station.multistatic
 
 
-def array_sight(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> Sight:
+def array_group(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> AntennaGroup:
     """Return the array's antennas, which look in parallel."""
-    return _sight(scenario, scenario.base_station.antenna, elements)
+    return _group(scenario, scenario.base_station.antenna, elements)
 
 
-def sending_sight(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> Sight | None:
+def sending_group(
+    scenario: Scenario, elements: Float[np.ndarray, "elements 3"]
+) -> AntennaGroup | None:
     """Return the antennas that transmit the array's echo; None: the elements themselves."""
     offset = scenario.base_station.transmit_offset
     if offset is None:
         return None
-    return _sight(scenario, scenario.base_station.antenna, elements + offset)
+    return _group(scenario, scenario.base_station.antenna, elements + offset)
 
 
-def user_sight(scenario: Scenario, name: str) -> Sight:
+def user_group(scenario: Scenario, name: str) -> AntennaGroup:
     """Return a user's antenna."""
     user = scenario.users[name]
-    return _sight(scenario, user.antenna, user.position[None])
+    return _group(scenario, user.antenna, user.position[None])
 
 
 def needed_reach(
@@ -59,15 +61,15 @@ def needed_reach(
     rough
         Ways over several mirrors, of which the object is the one that scatters diffusely.
     """
-    array = array_sight(scenario, elements)
-    send = sending_sight(scenario, elements) or array
+    array = array_group(scenario, elements)
+    send = sending_group(scenario, elements) or array
     most = scenario.max_bounces - 1
     pairs = [
         (out.image(send), back.image(array))
         for out, back in product((DIRECT, *legs), repeat=2)
         if out.bounces + back.bounces <= most
     ]
-    users = [user_sight(scenario, name) for name in scenario.users]
+    users = [user_group(scenario, name) for name in scenario.users]
     pairs += [(user, array) for user in users]
     over_several = []
     for chain in rough:
@@ -79,13 +81,13 @@ def needed_reach(
     return partial(_either, pairs, over_several)
 
 
-def _anywhere(sight: Sight) -> Sight:
-    return Sight(positions=sight.positions[:1], pattern=ISOTROPIC)
+def _anywhere(sight: AntennaGroup) -> AntennaGroup:
+    return AntennaGroup(positions=sight.positions[:1], pattern=ISOTROPIC)
 
 
 def _either(
-    pairs: Sequence[tuple[Sight, Sight]],
-    diffuse: Sequence[tuple[Sight, Sight]],
+    pairs: Sequence[tuple[AntennaGroup, AntennaGroup]],
+    diffuse: Sequence[tuple[AntennaGroup, AntennaGroup]],
     centres: Float[np.ndarray, "spheres 3"],
     radius: float,
 ) -> Bool[np.ndarray, " spheres"]:
@@ -95,6 +97,8 @@ def _either(
     return reached
 
 
-def _sight(scenario: Scenario, antenna: Antenna, positions: Float[np.ndarray, "n 3"]) -> Sight:
+def _group(
+    scenario: Scenario, antenna: Antenna, positions: Float[np.ndarray, "n 3"]
+) -> AntennaGroup:
     aim = scenario.aim(antenna, positions.mean(axis=0))
-    return Sight(positions=positions, pattern=AntennaPattern(antenna, aim))
+    return AntennaGroup(positions=positions, pattern=AntennaPattern(antenna, aim))

@@ -28,7 +28,7 @@ from simulator.materials.permittivity import (
 )
 from simulator.materials.reflection_coefficients import reflection_nodes
 from simulator.receiver.impairments import position_jitter
-from simulator.scene.array_antennas import array_sight, in_space, needed_reach, sending_sight
+from simulator.scene.array_antennas import array_group, in_space, needed_reach, sending_group
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors
 from simulator.specular.diffuse_chains import diffuse_legs, may_reach
 from simulator.visibility.mutual_visibility import MutualVisibility
@@ -79,7 +79,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
                 one
                 for one in diffuse_legs(mirrors.mirrors, mirrors.chains)
                 if mirrors.owners[one.rough] == name
-                and may_reach(mirrors.mirrors, one, array_sight(scenario, elements))
+                and may_reach(mirrors.mirrors, one, array_group(scenario, elements))
             ]
             reach = needed_reach(scenario, elements, legs, rough)
         surface = object_surface(scenario, name, seed=seed, sample=sample, reach=reach)
@@ -101,8 +101,8 @@ def _mirrors(
     materials: dict[str, Material],
     elements: Float[np.ndarray, "elements 3"],
 ) -> SceneMirrors:
-    array = array_sight(scenario, elements)
-    send = sending_sight(scenario, elements)
+    array = array_group(scenario, elements)
+    send = sending_group(scenario, elements)
     return scene_mirrors(scenario, materials, (array,) if send is None else (array, send))
 
 

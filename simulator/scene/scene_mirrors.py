@@ -7,7 +7,7 @@ import numpy as np
 
 from scenes.scenario import Scenario
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.materials.layered_media import Material
@@ -34,7 +34,7 @@ class SceneMirrors:
 
 
 def scene_mirrors(
-    scenario: Scenario, materials: Mapping[str, Material], sights: tuple[Sight, ...]
+    scenario: Scenario, materials: Mapping[str, Material], sights: tuple[AntennaGroup, ...]
 ) -> SceneMirrors:
     """Find a scenario's mirrors, and the legs over them.
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mirrors import Mirrors
 from simulator.specular.image_method import within_reach
 from simulator.specular.image_sources import DIRECT, Leg
@@ -41,7 +41,7 @@ def diffuse_legs(mirrors: Mirrors, legs: Sequence[Leg]) -> Iterator[DiffuseLeg]:
                 )
 
 
-def may_reach(mirrors: Mirrors, chain: DiffuseLeg, array: Sight) -> bool:
+def may_reach(mirrors: Mirrors, chain: DiffuseLeg, array: AntennaGroup) -> bool:
     """Tell whether rays over the mirrors before it may meet the rough one at all."""
     if not chain.before.sequence:
         return True

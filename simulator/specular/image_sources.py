@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from simulator.antennas.antenna_pattern import AntennaPattern
-from simulator.antennas.beam_culling import LEVEL, Sight
+from simulator.antennas.beam_culling import LEVEL, AntennaGroup
 from simulator.antennas.links import Links
 from simulator.geometry.mirrors import Mirrors
 from simulator.specular.image_method import unfolded_chain
@@ -36,7 +36,7 @@ class Leg:
         """Number of mirrors."""
         return len(self.sequence)
 
-    def image(self, sight: Sight) -> Sight:
+    def image(self, sight: AntennaGroup) -> AntennaGroup:
         """Mirror antennas, with the direction in which they look."""
         if not self.sequence:
             return sight
@@ -44,7 +44,7 @@ class Leg:
             sight.pattern.antenna, np.einsum("xy,y->x", self.turn, sight.pattern.aim)
         )
         places = np.einsum("xy,ny->nx", self.turn, sight.positions) + self.shift
-        return Sight(positions=places, pattern=pattern)
+        return AntennaGroup(positions=places, pattern=pattern)
 
     def onward(self, mirrors: Mirrors, *sequence: int) -> "Leg":
         """Go on over more mirrors."""
@@ -65,7 +65,9 @@ DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
 """The leg without mirrors."""
 
 
-def legs_within_reach(mirrors: Mirrors, sights: Sequence[Sight], most: int) -> tuple[Leg, ...]:
+def legs_within_reach(
+    mirrors: Mirrors, sights: Sequence[AntennaGroup], most: int
+) -> tuple[Leg, ...]:
     """Find the legs of one to so many mirrors that antennas' patterns reach.
 
     Parameters
@@ -99,7 +101,7 @@ def legs_within_reach(mirrors: Mirrors, sights: Sequence[Sight], most: int) -> t
     return tuple(grown(DIRECT))
 
 
-def _reflects(mirrors: Mirrors, mirror: int, image: Sight) -> bool:
+def _reflects(mirrors: Mirrors, mirror: int, image: AntennaGroup) -> bool:
     """Tell whether an image is on the reflecting side of a mirror."""
     heights = mirrors.heights(image.positions, mirror)
     return bool((np.abs(heights) if mirrors.two_sided[mirror] else heights).max() > 0)

@@ -29,7 +29,7 @@ from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from scenes.schema.roughness import Roughness
-from simulator.scene.array_antennas import array_sight, user_sight
+from simulator.scene.array_antennas import array_group, user_group
 from validation.bounds.position_bound import (
     Plane,
     PositionBound,
@@ -96,10 +96,10 @@ def roughness_floor(scenario: Scenario, user: str, wall: str) -> RoughnessFloor:
     rough = centre + places[:, None] * along
     planes = [Plane(point=centre, normal=normal)]
     towards = _unit(rough - place)
-    amplitude = user_sight(scenario, user).pattern.towards(towards)
+    amplitude = user_group(scenario, user).pattern.towards(towards)
     amplitude /= np.sqrt(np.linalg.norm(rough - place, axis=-1))
     projection = _projection(place, planes[0], positions=positions, frequencies=frequencies)
-    pattern = array_sight(scenario, positions).pattern
+    pattern = array_group(scenario, positions).pattern
     wavenumbers = 2 * np.pi * frequencies / speed_of_light
     image = image_and_slopes(place, (0,), planes)[0]
     response = np.zeros((count, 2))

@@ -17,7 +17,7 @@ from scenes.scenario import Scenario
 from simulator.geometry.mean_surfaces import mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.ray_scene import blocked, build_scene
-from simulator.scene.array_antennas import array_sight, user_sight
+from simulator.scene.array_antennas import array_group, user_group
 from simulator.scene.radio_scene import scenario_materials
 from simulator.scene.scene_mirrors import scene_mirrors
 from simulator.specular.image_method import find_chains
@@ -59,7 +59,7 @@ def user_waves(scenario: Scenario, user: str, *, weakest_db: float = -60.0) -> U
         raise ValueError(f"scenario {scenario.name!r} has no user {user!r}; it has: {known}")
     elements = scenario.base_station.element_positions
     frequencies = scenario.radio.frequencies
-    array, sender = array_sight(scenario, elements), user_sight(scenario, user)
+    array, sender = array_group(scenario, elements), user_group(scenario, user)
     found = scene_mirrors(scenario, scenario_materials(scenario), (array,))
     rays = build_scene(mean_surfaces(scenario))
     chains = find_chains(

@@ -9,7 +9,7 @@ from scipy.constants import speed_of_light
 
 from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import mirrored
-from estimator.imaging.phase_curvature import BENDS, bent_intensities, coherence
+from estimator.imaging.phase_curvature import BENDS, bent_intensities, coherence_factor
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
 from estimator.measurement.model import Echo
 
@@ -33,7 +33,7 @@ def resolution(world: Any) -> Any:
 
 
 def shares(world: Any, ready: RangeProfiles, point: Float[np.ndarray, " 3"], flat: bool) -> float:
-    found = coherence(ready, point[None], resolution(world), flat=flat, noise=0.0)
+    found = coherence_factor(ready, point[None], resolution(world), flat=flat, noise=0.0)
     return float(found[0])
 
 
@@ -104,7 +104,7 @@ def test_noise_is_no_wave_and_does_not_hide_one(world: Any) -> None:
     weak = of_samples(world, noise + wave / np.sqrt(world.band.size))
     # As strong as the noise of each profile: half of the energy, all of it once noise is out.
     assert shares(world, weak, POINT, flat=False) == pytest.approx(0.5, abs=0.15)
-    found = coherence(
+    found = coherence_factor(
         weak, POINT[None], resolution(world), flat=False, noise=float(world.band.size)
     )
     assert found[0] == pytest.approx(1.0, abs=0.25)

@@ -82,9 +82,16 @@ def decided(
     walls: list[Wall],
     *,
     imaged: bool = True,
-    loose: Float[np.ndarray, "peaks 3"] = NOTHING_LOOSE,
+    unassigned_peaks: Float[np.ndarray, "peaks 3"] = NOTHING_LOOSE,
 ) -> UserEstimate:
-    return decide("ann", together(paths), walls, resolution=RESOLUTION, imaged=imaged, loose=loose)
+    return decide(
+        "ann",
+        together(paths),
+        walls,
+        resolution=RESOLUTION,
+        imaged=imaged,
+        unassigned_peaks=unassigned_peaks,
+    )
 
 
 def test_a_direct_path_is_the_user() -> None:
@@ -178,7 +185,7 @@ def test_a_second_path_tells_whether_the_first_meets_a_walls_very_end() -> None:
 def test_a_place_over_a_wall_between_two_peaks_is_known_as_well_as_they_are() -> None:
     image = np.array([0.0, 1.5, 0.0])
     ends = np.array([[-0.1, 0.7, 0.0], [0.1, 0.9, 0.0]])
-    found = decided([direct(image)], [], loose=ends)
+    found = decided([direct(image)], [], unassigned_peaks=ends)
     (other,) = found.alternatives
     assert other.position is not None
     assert other.covariance is not None
@@ -202,13 +209,13 @@ def test_a_place_over_a_wall_between_two_peaks_is_known_as_well_as_they_are() ->
 def test_something_on_the_straight_way_may_be_a_short_mirror() -> None:
     user = np.array([0.0, 0.9, 0.0])
     post = np.array([[0.001, 0.5, 0.0]])
-    found = decided([direct(user)], [], loose=post)
+    found = decided([direct(user)], [], unassigned_peaks=post)
     assert (found.status, found.line_of_sight) == ("ambiguous", None)
     assert found.reason is not None
     assert "something stands on the straight way at (0.001, 0.500) m" in found.reason
     # Beside the ray by more than two cells, or where the user itself is, it is nothing.
     for place in ([0.03, 0.5, 0.0], [0.0, 0.89, 0.0]):
-        assert decided([direct(user)], [], loose=np.array([place])).status == "found"
+        assert decided([direct(user)], [], unassigned_peaks=np.array([place])).status == "found"
 
 
 @pytest.mark.parametrize(
@@ -225,7 +232,7 @@ def test_an_echo_too_noisy_to_show_walls_leaves_the_straight_way_open(
         walls,
         resolution=RESOLUTION,
         imaged=True,
-        loose=NOTHING_LOOSE,
+        unassigned_peaks=NOTHING_LOOSE,
         contrast=contrast,
     )
     assert answer.status == status
@@ -238,9 +245,14 @@ def test_an_echo_too_noisy_to_show_walls_leaves_the_straight_way_open(
 
 def late(paths: list[Path], walls: list[Wall]) -> UserEstimate:
     return decide(
-        "ann", together(paths), walls, resolution=RESOLUTION, imaged=True, loose=NOTHING_LOOSE,
+        "ann",
+        together(paths),
+        walls,
+        resolution=RESOLUTION,
+        imaged=True,
+        unassigned_peaks=NOTHING_LOOSE,
         clock_known=False,
-    )  # fmt: skip
+    )
 
 
 def shifted(one: Path, length: float) -> Path:
@@ -378,7 +390,7 @@ def test_well_inside_or_well_beside_a_wall_nothing_is_ambiguous() -> None:
 def test_a_ray_between_two_loose_points_may_pass_over_a_wall_too_smooth_to_be_seen() -> None:
     ends = np.array([[-0.1, 0.5, 0.0], [0.1, 0.5, 0.0]])
     ahead = path(90.0, 0.9)
-    found = decided([ahead], [], loose=ends)
+    found = decided([ahead], [], unassigned_peaks=ends)
     assert found.status == "ambiguous"
     assert found.reason is not None
     assert "too smooth to be seen" in found.reason
@@ -386,6 +398,9 @@ def test_a_ray_between_two_loose_points_may_pass_over_a_wall_too_smooth_to_be_se
     assert other.position is not None
     np.testing.assert_allclose(other.position, [0.0, 0.1, 0.0], atol=1e-9)  # folded at y = 0.5
     # A user before them, or beside, is not in doubt; nor is one over a wall that is seen.
-    assert decided([path(90.0, 0.45)], [], loose=ends).status == "found"
-    assert decided([path(60.0, 0.9)], [], loose=ends).status == "found"
-    assert decided([reflected(np.array([1.0, 0.8, 0.0]))], [SLANTED], loose=ends).status == "found"
+    assert decided([path(90.0, 0.45)], [], unassigned_peaks=ends).status == "found"
+    assert decided([path(60.0, 0.9)], [], unassigned_peaks=ends).status == "found"
+    assert (
+        decided([reflected(np.array([1.0, 0.8, 0.0]))], [SLANTED], unassigned_peaks=ends).status
+        == "found"
+    )

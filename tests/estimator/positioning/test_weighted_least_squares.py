@@ -70,7 +70,7 @@ def test_it_is_the_least_squares_over_position_clock_and_walls(kinds: int) -> No
     covariances = np.linalg.inv(jacobian.T @ jacobian)[:2, :2]
     np.testing.assert_allclose(found.covariance[:2, :2], covariances, rtol=0, atol=
                                2e-3 * np.trace(covariances))  # fmt: skip
-    assert found.mismatch == pytest.approx(2 * full.cost, rel=2e-2)
+    assert found.chi_square == pytest.approx(2 * full.cost, rel=2e-2)
     assert found.freedom == 3 * kinds - 2 - (kinds == 3)
     assert found.agrees
 
@@ -84,7 +84,7 @@ def test_exact_paths_give_the_user_and_its_clock(x: float, y: float, clock: floa
     found = solve_position(SIGHTINGS, observed, covariance, WALLS, block_covariance(WALLS))
     np.testing.assert_allclose(found.position, user, atol=1e-9)
     assert found.clock_offset == pytest.approx(clock / 299792458, abs=1e-17)
-    assert found.mismatch <= 1e-6
+    assert found.chi_square <= 1e-6
 
 
 def test_two_paths_over_one_wall_share_its_error() -> None:

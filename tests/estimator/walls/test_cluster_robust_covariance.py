@@ -27,9 +27,9 @@ def drawn(
     for _ in range(TRIALS):
         data = error(rng)
         found = np.linalg.solve(DESIGNS.T @ gains, gains.T @ data)
-        pushes = weights * (data - DESIGNS @ found)
+        scores = weights * (data - DESIGNS @ found)
         errors.append(found)
-        covariances.append(clustered_covariance(PLACES, DESIGNS, pushes, gains, part=PART))
+        covariances.append(clustered_covariance(PLACES, DESIGNS, scores, gains, part=PART))
     return np.array(errors), np.array(covariances)
 
 
@@ -83,9 +83,9 @@ def test_a_line_that_hangs_on_one_glint_turns_as_the_rest_of_the_wall_lets_it() 
 
 def test_rounding_does_not_decide_to_which_part_a_place_belongs() -> None:
     # 241 places in twelve parts: every twentieth lies on a cut.
-    pushes = np.random.default_rng(2).normal(size=PLACES.size)
+    scores = np.random.default_rng(2).normal(size=PLACES.size)
     first, other = (
-        clustered_covariance(places, DESIGNS, pushes, DESIGNS, part=PART)
+        clustered_covariance(places, DESIGNS, scores, DESIGNS, part=PART)
         for places in (PLACES * (1 - 1e-13), PLACES * (1 + 1e-13) + 1e-16)
     )
     np.testing.assert_allclose(first, other, rtol=1e-9)

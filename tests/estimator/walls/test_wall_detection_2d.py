@@ -17,7 +17,7 @@ from estimator.walls.wall_detection_2d import (
     LEAST_CELLS,
     LEAST_CONFIDENCE,
     detect_mirrors,
-    loose_peaks,
+    unassigned_peaks,
 )
 
 WALLS = 12
@@ -235,17 +235,17 @@ def test_loose_peaks_are_those_neither_on_a_wall_nor_behind_it(world: Any) -> No
     looked = survey(echo)
     lines = detect_mirrors(echo, looked)
     assert len(lines) == 1
-    loose = loose_peaks(echo, looked, lines)
+    unassigned = unassigned_peaks(echo, looked, lines)
 
     def nearest(points: Float[np.ndarray, "peaks 3"], place: Float[np.ndarray, "1 3"]) -> float:
         return float(np.linalg.norm(points - place, axis=-1).min())
 
     assert nearest(looked.peaks, before) < 4e-3
     assert nearest(looked.peaks, behind) < 4e-3
-    assert nearest(loose, before) < 4e-3
-    assert nearest(loose, behind) > 0.02
+    assert nearest(unassigned, before) < 4e-3
+    assert nearest(unassigned, behind) > 0.02
     # All of them, where there is no wall.
-    np.testing.assert_array_equal(loose_peaks(echo, looked, ()), looked.peaks)
+    np.testing.assert_array_equal(unassigned_peaks(echo, looked, ()), looked.peaks)
 
 
 @pytest.mark.parametrize("points", [2, 11])

@@ -37,9 +37,9 @@ def test_a_source_near_the_array_is_found_exactly_without_noise() -> None:
         uplink, cosines=cosines, path_length=distance + 0.008, curvature=0.7 / distance
     )
     assert free.curvature == pytest.approx(1 / distance, rel=1e-3)
-    left = uplink.samples - wavefront_field(uplink.positions, BAND, free)
+    residual = uplink.samples - wavefront_field(uplink.positions, BAND, free)
     # The gain's λ/4πR is fitted by its mean over the band: ±6 % at its ends.
-    assert np.linalg.norm(left) < 0.05 * np.linalg.norm(uplink.samples)
+    assert np.linalg.norm(residual) < 0.05 * np.linalg.norm(uplink.samples)
 
 
 def test_the_echo_of_a_wall_met_head_on_is_flat_and_gives_its_plane() -> None:

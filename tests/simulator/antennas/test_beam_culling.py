@@ -12,7 +12,7 @@ from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import facets_visible
 from simulator.response.single_bounce_3d import scattered_in_space, sightlines
 from simulator.scattering.physical_optics import scattered
-from simulator.scene.array_antennas import array_sight, user_sight
+from simulator.scene.array_antennas import array_group, user_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 
 
@@ -64,8 +64,8 @@ def test_what_patterns_leave_out_is_below_its_bound(over: str) -> None:
     assert made.facets is not None
     assert every.facets is not None
     assert made.facets.count < 0.8 * every.facets.count
-    array = array_sight(scenario, made.elements)
-    send = array if over == "echo" else user_sight(scenario, "far")
+    array = array_group(scenario, made.elements)
+    send = array if over == "echo" else user_group(scenario, "far")
     found = scattered_in_space(made, send, array)
     facets = every.facets
     seen = np.ones((len(array.positions), facets.count), dtype=bool)
@@ -109,7 +109,7 @@ def test_shafts_see_what_rays_see() -> None:
     scene = radio_scene(scenario, seed=1, sample=0)
     facets = scene.facets
     assert facets is not None
-    array, user = array_sight(scenario, scene.elements), user_sight(scenario, "far")
+    array, user = array_group(scenario, scene.elements), user_group(scenario, "far")
     some = np.arange(0, facets.count, 3)
     look = sightlines(scene, user, array)
     seen = look(some)

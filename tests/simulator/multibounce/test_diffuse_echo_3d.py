@@ -10,13 +10,13 @@ from scipy.constants import speed_of_light
 
 from scenes.scenario import Scenario, parse_scenario
 from simulator.antennas.antenna_pattern import ISOTROPIC
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.links import Links
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_3d import coherent_echo
 from simulator.scattering.patch_sum import scattered_by_patches
-from simulator.scene.array_antennas import array_sight
+from simulator.scene.array_antennas import array_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.specular.diffuse_chains import diffuse_legs
 from simulator.visibility.seen import Seen
@@ -111,7 +111,7 @@ def test_a_ghost_over_a_rough_wall_is_that_of_physical_optics_twice() -> None:
     found, twice, coherent = [], [], []
     for seed in range(3):
         scenario, made = scene(rms_mm=1.0, seed=seed)
-        array = array_sight(scenario, made.elements)
+        array = array_group(scenario, made.elements)
         coherent.append(coherent_echo(made, array, array)[0])
         found.append(coherent[-1] + diffuse_echo(made, array, array)[0])
         twice.append(physical_optics_twice(made, array.positions[0], array.pattern))
@@ -124,7 +124,7 @@ def test_a_ghost_over_a_rough_wall_is_that_of_physical_optics_twice() -> None:
 def test_a_smooth_mirror_scatters_nothing_diffusely() -> None:
     """Neither does one whose heights are far below a wavelength: (k rms)² of the power."""
     scenario, made = scene(rms_mm=0.002, size_m=(0.2, 0.1))
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     diffuse, coherent = diffuse_echo(made, array, array), coherent_echo(made, array, array)
     assert 0 < np.linalg.norm(diffuse) < 0.02 * np.linalg.norm(coherent)
 
@@ -136,8 +136,8 @@ def test_the_diffuse_part_has_no_mean_over_realisations() -> None:
     for seed in range(SEEDS):
         scenario, made = scene(rms_mm=1.0, size_m=(0.12, 0.06), seed=seed, points=3)
         assert made.mirrors is not None
-        array = array_sight(scenario, made.elements)
-        place = Sight(positions=np.array([[0.55, 0.8, 0.0]]), pattern=ISOTROPIC)
+        array = array_group(scenario, made.elements)
+        place = AntennaGroup(positions=np.array([[0.55, 0.8, 0.0]]), pattern=ISOTROPIC)
         (chain,) = diffuse_legs(made.mirrors.mirrors, made.mirrors.legs[:1])
         waves.append(diffuse_wave(made, chain, array, place)[0, 1])
     parts = np.array(waves).view(np.float64).reshape(SEEDS, 2)
@@ -148,8 +148,10 @@ def test_the_diffuse_part_has_no_mean_over_realisations() -> None:
 
 def test_transmitter_and_receiver_may_change_places() -> None:
     scenario, made = scene(rms_mm=0.8, size_m=(0.2, 0.1))
-    here = array_sight(scenario, made.elements)
-    there = Sight(positions=here.positions + np.array([0.03, 0.0, 0.01]), pattern=here.pattern)
+    here = array_group(scenario, made.elements)
+    there = AntennaGroup(
+        positions=here.positions + np.array([0.03, 0.0, 0.01]), pattern=here.pattern
+    )
     one, other = diffuse_echo(made, here, there), diffuse_echo(made, there, here)
     assert np.linalg.norm(one) > 0
     assert np.linalg.norm(one - other) <= RECIPROCITY * np.linalg.norm(one)
@@ -165,9 +167,11 @@ def test_a_pilot_over_a_mirror_and_a_rough_wall_comes_from_the_users_image() -> 
     scenario, alone = scene(**options)
     assert both.mirrors is not None
     assert alone.mirrors is not None
-    array = array_sight(scenario, alone.elements)
-    user = Sight(positions=np.array([[1.0, 1.2, 0.12]]), pattern=ISOTROPIC)
-    image = Sight(positions=np.array([[1.4, 0.8, 0.12]]), pattern=ISOTROPIC)  # in y = x - 0.2
+    array = array_group(scenario, alone.elements)
+    user = AntennaGroup(positions=np.array([[1.0, 1.2, 0.12]]), pattern=ISOTROPIC)
+    image = AntennaGroup(
+        positions=np.array([[1.4, 0.8, 0.12]]), pattern=ISOTROPIC
+    )  # in y = x - 0.2
     chains = diffuse_legs(both.mirrors.mirrors, both.mirrors.chains)
     chain = next(one for one in chains if one.leg.sequence == (0, 1) and one.rough == 0)
     (single,) = (one for one in diffuse_legs(alone.mirrors.mirrors, alone.mirrors.legs[:1]))
@@ -190,10 +194,10 @@ def test_a_pilot_over_two_mirrors_and_a_rough_wall_comes_from_the_image_of_the_u
     scenario, alone = scene(**options)
     assert all_three.mirrors is not None
     assert alone.mirrors is not None
-    array = array_sight(scenario, alone.elements)
+    array = array_group(scenario, alone.elements)
     # So high that the can is in nobody's way.
-    user = Sight(positions=np.array([[1.0, 1.2, 0.25]]), pattern=ISOTROPIC)
-    image = Sight(positions=np.array([[2.2, 0.8, 0.25]]), pattern=ISOTROPIC)
+    user = AntennaGroup(positions=np.array([[1.0, 1.2, 0.25]]), pattern=ISOTROPIC)
+    image = AntennaGroup(positions=np.array([[2.2, 0.8, 0.25]]), pattern=ISOTROPIC)
     chains = diffuse_legs(all_three.mirrors.mirrors, all_three.mirrors.chains)
     chain = next(one for one in chains if one.leg.sequence == (0, 1, 2) and one.rough == 0)
     (single,) = (one for one in diffuse_legs(alone.mirrors.mirrors, alone.mirrors.legs[:1]))

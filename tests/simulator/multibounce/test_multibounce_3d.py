@@ -10,13 +10,13 @@ from scipy.constants import speed_of_light
 
 from scenes.scenario import Scenario, parse_scenario
 from simulator.antennas.antenna_pattern import ISOTROPIC
-from simulator.antennas.beam_culling import Sight
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.links import Links
 from simulator.materials.layered_media import Conductor
 from simulator.multibounce.multibounce_3d import coherent_echo, echo_over_mirrors
 from simulator.response.uplink import simulate_uplink
 from simulator.scattering.patch_sum import scattered_by_patches
-from simulator.scene.array_antennas import array_sight
+from simulator.scene.array_antennas import array_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.specular.path_field import roughness_loss
 from simulator.visibility.seen import Seen
@@ -77,7 +77,7 @@ def mirrored(points: np.ndarray) -> np.ndarray:
 
 def in_plain_sight(scenario: Scenario, made: RadioScene) -> np.ndarray:
     """The can's echo as heard where the array's image stands, nothing in the way."""
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     places = mirrored(array.positions)
     aim = mirrored(array.positions[:1] + array.pattern.aim)[0] - places[0]
     pattern = type(array.pattern)(array.pattern.antenna, aim)
@@ -94,14 +94,14 @@ def error(found: np.ndarray, exact: np.ndarray) -> float:
 
 def test_a_target_hidden_behind_a_screen_echoes_as_its_image_does() -> None:
     scenario, made = scene()
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     ghost = echo_over_mirrors(made, array, array)
     assert error(ghost, in_plain_sight(scenario, made)) <= ACCURACY
 
 
 def test_a_rough_mirror_loses_its_coherent_part_once_each_way() -> None:
     scenario, made = scene(rms_mm=0.6)
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     ghost = coherent_echo(made, array, array)
     wavenumbers = 2 * np.pi * scenario.radio.frequencies / speed_of_light
     loss = roughness_loss(wavenumbers * 0.6e-3 * np.cos(np.pi / 4))
@@ -113,7 +113,7 @@ def test_without_the_screen_both_mixed_ways_are_added() -> None:
     """Wall-target and target-wall are one by reciprocity, beside wall-target-wall."""
     wide: Any = {"antenna": {"kind": "isotropic"}}
     scenario, made = scene(hidden=False, **wide)
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     ghost = echo_over_mirrors(made, array, array)
     only = in_plain_sight(scenario, made)
     places = mirrored(array.positions)
@@ -126,8 +126,10 @@ def test_without_the_screen_both_mixed_ways_are_added() -> None:
 @pytest.mark.parametrize("material", ["metal", {"name": "plasterboard", "thickness_mm": 9.5}])
 def test_transmitter_and_receiver_may_change_places(material: Any) -> None:
     scenario, made = scene(wall=material)
-    here = array_sight(scenario, made.elements)
-    there = Sight(positions=here.positions + np.array([0.03, 0.0, 0.01]), pattern=here.pattern)
+    here = array_group(scenario, made.elements)
+    there = AntennaGroup(
+        positions=here.positions + np.array([0.03, 0.0, 0.01]), pattern=here.pattern
+    )
     one = echo_over_mirrors(made, here, there)
     other = echo_over_mirrors(made, there, here)
     assert error(one, other) <= ACCURACY
@@ -153,7 +155,7 @@ def test_a_corner_of_two_walls_returns_the_antennas_image() -> None:
         }
     )  # fmt: skip
     made = radio_scene(scenario, seed=0, sample=0)
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     found = echo_over_mirrors(made, array, array)
     edge = np.array([0.0, 1.1])
     lengths = 2 * np.linalg.norm(array.positions[:, :2] - edge, axis=-1)
@@ -197,7 +199,7 @@ def test_a_pilot_over_two_mirrors_travels_as_from_the_image_of_the_image() -> No
 def test_a_ghost_over_a_wall_is_that_of_physical_optics_twice() -> None:
     """One-way waves over the wall's facets at each facet of the can, linked by reciprocity."""
     scenario, made = scene(antenna={"kind": "isotropic"})
-    array = array_sight(scenario, made.elements)
+    array = array_group(scenario, made.elements)
     found = echo_over_mirrors(made, array, array)[0]
     source, wall, can = array.positions[0], made.facets_of("wall"), made.facets_of("can")
     assert isinstance(wall.materials[0], Conductor)
