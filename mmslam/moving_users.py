@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from zarr.storage import LocalStore
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import MeasurementError
 from estimator.measurement.store import is_store, read_measurement
 from estimator.results.estimate import Estimate, Progress, UserEstimate

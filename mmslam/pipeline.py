@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Measurement
 from estimator.measurement.store import read_measurement, write_measurement
 from estimator.results.estimate import Estimate, Progress

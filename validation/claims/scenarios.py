@@ -9,7 +9,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from scipy.stats import beta, chi2, norm
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate
 from scenes.files.loading import load_scenario

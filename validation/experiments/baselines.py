@@ -29,7 +29,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.baselines.angle_difference import angle_difference

@@ -28,7 +28,7 @@ from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from estimator.geometry.wall_2d import Wall
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_positioning import SeenWall, search_diffuse
 from estimator.results.estimate import Estimate, UserEstimate

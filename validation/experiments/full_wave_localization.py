@@ -33,7 +33,7 @@ from jaxtyping import Complex
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement, Uplink
 from scenes.files.loading import load_scenario, override_scenario
 from scenes.realisations.object_surface import object_surface

@@ -40,7 +40,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from estimator.channel.relax import extract_paths
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario

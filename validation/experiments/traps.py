@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.results.estimate import Estimate, Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate

@@ -21,7 +21,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.results.estimate import Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate

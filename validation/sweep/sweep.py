@@ -217,7 +217,7 @@ def run_point(job: SweepJob, point: int) -> None:
     path = _outcome_file(job, scenario, point)
     seed, sample = job.config.seed, point // job.config.grid_size
     quiet = noise_free(scenario, seed=seed, sample=sample, folder=job.cache / "noise_free")
-    from estimator.localization.locate import locate
+    from estimator.localization.pipeline import locate
 
     estimate = locate(with_receiver(quiet, scenario, seed=seed, sample=sample))
     truth = truth_from_dataset(scenario_truth(scenario))

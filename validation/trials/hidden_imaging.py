@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from estimator.array.resolution import cell_at
 from estimator.geometry.wall_2d import mirrored
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement
 from estimator.results.estimate import Estimate, Image
 from scenes.scenario import Scenario

@@ -12,7 +12,7 @@ from scipy.constants import speed_of_light
 from estimator.array.resolution import angular_resolution, range_resolution
 from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.geometry.wall_2d import mirrored
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Measurement, Uplink
 from estimator.results.estimate import Estimate, Mirror, UserEstimate
 from scenes.scenario import Scenario

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.planar_array import planar_array, planar_frame, spans_a_plane
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError
 from estimator.results.estimate import Estimate
 from validation.analytic.point_scatterer import complex_noise, point_uplink

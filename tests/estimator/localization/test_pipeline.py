@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from estimator.geometry.wall_2d import mirrored
-from estimator.localization.locate import locate
+from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.results.estimate import Estimate, UserEstimate
 from scenes.scenario import parse_scenario
