@@ -1,5 +1,8 @@
 r"""From a measurement to a map and a position; it never sees the scene.
 
+:func:`locate` is the whole way through; the sub-packages are its parts, usable on plain arrays.
+The names that the package offers are loaded when they are first used.
+
 Glossary: the thesis' symbol, our name, unit.
 
 =================  ======================  =====
@@ -17,6 +20,10 @@ symbol             name                    unit
 =================  ======================  =====
 """
 
+import lazy_loader
+
 from estimator.compute import engine
 
 engine.prepare()
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

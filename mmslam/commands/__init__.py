@@ -1,1 +1,8 @@
-"""."""
+"""What the commands do, without the command line: run, write, and say it in lines.
+
+Each module serves one command and the function of the same purpose in ``mmslam``.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,8 @@
-"""."""
+"""Bounds on errors: Cramér–Rao for waves, walls and positions, and the floor by roughness.
+
+No unbiased estimator is better than these; ours is compared with them.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

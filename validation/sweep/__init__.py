@@ -1,1 +1,9 @@
-"""."""
+"""Sweeps: errors over a grid of a scenario's keys, with bounds; tables and figures.
+
+What was computed is kept under a digest of all that it depends on, so a sweep can be interrupted
+and extended.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

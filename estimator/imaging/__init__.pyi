@@ -1,0 +1,28 @@
+from .backprojection import backproject, focus, focus_uplink, prepare
+from .focusing import Focus, focus_within
+from .image_former import ImageFormer
+from .peak_detection import mean_background
+from .range_compression import RangeProfiles, range_profiles, unambiguous_path
+from .range_gating import gated
+from .survey_2d import Survey, survey
+from .survey_3d import VolumeSurvey, lobe_origins, survey_volume
+
+__all__ = [
+    "Focus",
+    "ImageFormer",
+    "RangeProfiles",
+    "Survey",
+    "VolumeSurvey",
+    "backproject",
+    "focus",
+    "focus_uplink",
+    "focus_within",
+    "gated",
+    "lobe_origins",
+    "mean_background",
+    "prepare",
+    "range_profiles",
+    "survey",
+    "survey_volume",
+    "unambiguous_path",
+]

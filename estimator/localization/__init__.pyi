@@ -1,0 +1,5 @@
+from .pipeline import locate
+
+__all__ = [
+    "locate",
+]

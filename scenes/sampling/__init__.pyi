@@ -1,0 +1,33 @@
+from .distributions import (
+    Choice,
+    Grid,
+    InBox,
+    InPolygon,
+    Listed,
+    LogUniform,
+    Normal,
+    Uniform,
+    UniformInteger,
+)
+from .drawn_parameters import Parameter
+from .sample_space import Attempt, SampleSpace, impossible_sample, open_sample_space
+from .variations import Variations, load_variations
+
+__all__ = [
+    "Attempt",
+    "Choice",
+    "Grid",
+    "InBox",
+    "InPolygon",
+    "Listed",
+    "LogUniform",
+    "Normal",
+    "Parameter",
+    "SampleSpace",
+    "Uniform",
+    "UniformInteger",
+    "Variations",
+    "impossible_sample",
+    "load_variations",
+    "open_sample_space",
+]

@@ -1,0 +1,53 @@
+from .antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
+from .base_station import BaseStation
+from .directions import unit_vector
+from .errors import ScenarioError, did_you_mean, problems, shown
+from .impairments import Impairments
+from .materials import Slab, usual_texture
+from .multistatic import Arc, Places, Transmitter
+from .objects import Body, Box, Cylinder, MeshFile, Plate, SceneObject, largest_size, smallest_size
+from .permittivity_table import band_problem, read_permittivity_table, table_problem, value_problem
+from .point_target import PointTarget
+from .quantities import Checked, Name, Position
+from .radio import Radio
+from .roughness import Roughness, Spectrum
+
+__all__ = [
+    "Antenna",
+    "Arc",
+    "BaseStation",
+    "Body",
+    "Box",
+    "Checked",
+    "Cosine",
+    "Cylinder",
+    "Directive",
+    "GaussianBeam",
+    "Horn",
+    "Impairments",
+    "Isotropic",
+    "MeshFile",
+    "Name",
+    "Places",
+    "Plate",
+    "PointTarget",
+    "Position",
+    "Radio",
+    "Roughness",
+    "ScenarioError",
+    "SceneObject",
+    "Slab",
+    "Spectrum",
+    "Transmitter",
+    "band_problem",
+    "did_you_mean",
+    "largest_size",
+    "problems",
+    "read_permittivity_table",
+    "shown",
+    "smallest_size",
+    "table_problem",
+    "unit_vector",
+    "usual_texture",
+    "value_problem",
+]

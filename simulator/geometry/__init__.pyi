@@ -1,0 +1,27 @@
+from .faces import Face, scattering_faces
+from .facets import Facets, joined, profile_surface, scene_facets, surface_facets
+from .mean_surfaces import mean_mirrors, rms_height
+from .mirrors import Mirrors, dot, line_mirrors
+from .patches import Patches, cut_into_patches, patch_side
+from .ray_scene import blocked, build_scene, facets_visible
+
+__all__ = [
+    "Face",
+    "Facets",
+    "Mirrors",
+    "Patches",
+    "blocked",
+    "build_scene",
+    "cut_into_patches",
+    "dot",
+    "facets_visible",
+    "joined",
+    "line_mirrors",
+    "mean_mirrors",
+    "patch_side",
+    "profile_surface",
+    "rms_height",
+    "scattering_faces",
+    "scene_facets",
+    "surface_facets",
+]

@@ -1,0 +1,55 @@
+from .layered_media import (
+    Absorber,
+    Conductor,
+    Dielectric,
+    Material,
+    named_material,
+    reflection,
+    slab,
+    transmission,
+)
+from .permittivity import (
+    ConstantPermittivity,
+    MaterialError,
+    Permittivity,
+    PowerLawPermittivity,
+    TabulatedPermittivity,
+    itu_permittivity,
+    read_permittivity,
+)
+from .reflection_coefficients import (
+    angle_class,
+    echo_coefficient,
+    facet_coefficients,
+    half_angle_cosine,
+    reflection_nodes,
+    vertical_polarization,
+)
+from .sionna_materials import radio_material, scattering_coefficient, sionna_slab
+
+__all__ = [
+    "Absorber",
+    "Conductor",
+    "ConstantPermittivity",
+    "Dielectric",
+    "Material",
+    "MaterialError",
+    "Permittivity",
+    "PowerLawPermittivity",
+    "TabulatedPermittivity",
+    "angle_class",
+    "echo_coefficient",
+    "facet_coefficients",
+    "half_angle_cosine",
+    "itu_permittivity",
+    "named_material",
+    "radio_material",
+    "read_permittivity",
+    "reflection",
+    "reflection_nodes",
+    "scattering_coefficient",
+    "sionna_slab",
+    "slab",
+    "transmission",
+    "vertical_polarization",
+]

@@ -1,0 +1,7 @@
+from .impairments import position_jitter
+from .receiver import received
+
+__all__ = [
+    "position_jitter",
+    "received",
+]

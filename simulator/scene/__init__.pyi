@@ -1,0 +1,20 @@
+from .array_antennas import array_group, in_space, sending_group, user_group
+from .radio_scene import RadioScene, antenna_pattern, facet_ports, scenario_materials, true_elements
+from .scenario_paths import ScenarioPath
+from .scene_mirrors import SceneMirrors
+from .truth import scenario_truth
+
+__all__ = [
+    "RadioScene",
+    "ScenarioPath",
+    "SceneMirrors",
+    "antenna_pattern",
+    "array_group",
+    "facet_ports",
+    "in_space",
+    "scenario_materials",
+    "scenario_truth",
+    "sending_group",
+    "true_elements",
+    "user_group",
+]
