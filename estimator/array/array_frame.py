@@ -7,10 +7,14 @@ from jaxtyping import Float
 
 from estimator.measurement.model import MeasurementError
 
+MOST_SLANT = 1e-3
+"""Cosine between the boresight that is stated and the array's line, up to which it is rounding:
+0.06°. [-]"""
+
 STRAIGHTNESS = 1e-4
-"""Largest distance of a phase centre from the array's line; 0.1 mm is 0.6 rad at 300 GHz,
-measured positions may well depart by their jitter, and every method here uses the
-positions themselves, only the frame is made of the line. [m]"""
+"""Largest distance of a phase centre from the array's line. Measured positions depart by their
+jitter: 0.1 mm is a phase of 0.6 rad at 300 GHz. Every method uses the positions themselves; only
+the frame is that of the line. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,11 +72,11 @@ def array_frame(
         )
     axis = directions[0] * np.sign(directions[0] @ np.cross(boresight, [0.0, 0.0, 1.0]) or 1.0)
     slant = abs(float(axis @ boresight))
-    if slant > 1e-3:
+    if slant > MOST_SLANT:
         raise MeasurementError(
             f"boresight: {np.degrees(np.arccos(slant)):.2f}° from the array's axis; it must be "
             "perpendicular to it (90°)"
         )
-    ahead = boresight - (boresight @ axis) * axis  # a rounded boresight must not bend space
+    ahead = boresight - (boresight @ axis) * axis  # exactly perpendicular, though it was rounded
     ahead = ahead / np.linalg.norm(ahead)
     return ArrayFrame(origin=origin, axes=np.stack([axis, ahead, np.cross(axis, ahead)]))

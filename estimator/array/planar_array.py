@@ -7,6 +7,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.array_frame import ArrayFrame
+from estimator.array.linear_array import LEAST_DEPTH, WIDEST_SINE
 from estimator.array.resolution import unaliased_sine
 from estimator.array.resolution_cell import Resolution
 from estimator.measurement.model import Echo, MeasurementError, Uplink, frequency_step
@@ -18,8 +19,18 @@ array: 0.1 mm is 0.6 rad at 300 GHz. Every method uses the positions themselves.
 PLANAR = 0.05
 """Width over length from which positions span a plane; a line that jitters is narrower. [-]"""
 
-WIDEST_SINE = 0.95
-"""Largest direction sine that is imaged: short of endfire. [-]"""
+LEAST_WIDTH = 10.0
+"""The same over :data:`FLATNESS`: 1 mm. [-]"""
+
+MOST_SLANT = 1e-3
+"""Largest angle between the boresight that is stated and the normal of the array: 0.06°, a stated
+value's rounding. [rad]"""
+
+ROUNDING = 1e-9
+"""Component of a normal that is rounding: an array along the world's axes has exactly these. [-]"""
+
+REACH_MARGIN = 0.995
+"""Part of the unambiguous distance that is used, for rounding's sake. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +63,7 @@ def spans_a_plane(positions: Float[np.ndarray, "positions 3"]) -> bool:
         return False
     directions = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2]
     extents = np.ptp(positions @ directions.T, axis=0)
-    return bool(extents[1] > max(PLANAR * extents[0], 10 * FLATNESS))
+    return bool(extents[1] > max(PLANAR * extents[0], LEAST_WIDTH * FLATNESS))
 
 
 def planar_frame(
@@ -82,13 +93,12 @@ def planar_frame(
         )
     ahead = directions[2] * np.sign(directions[2] @ boresight or 1.0)
     slant = float(np.linalg.norm(np.cross(ahead, boresight)))
-    if slant > 1e-3:
+    if slant > MOST_SLANT:
         raise MeasurementError(
             f"boresight: {np.degrees(np.arcsin(min(slant, 1.0))):.2f}° from the normal of the "
             "planar array; it must be perpendicular to the array"
         )
-    # Positions are rounded: an array along the world's axes is to have exactly those.
-    ahead = np.where(np.abs(ahead) < 1e-9, 0.0, ahead)
+    ahead = np.where(np.abs(ahead) < ROUNDING, 0.0, ahead)
     ahead = ahead / np.linalg.norm(ahead)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     if np.linalg.norm(right) < 1e-6:  # it looks straight up or down
@@ -145,11 +155,11 @@ def planar_reach(
     """
     limit = speed_of_light / (passes * frequency_step(measured.frequencies))
     sine = min(1.0, np.sqrt(2) * array.unaliased(measured.frequencies, passes=passes))
-    # |p − q|² ≤ R² + 2 R h sin φ + h² for an element at h; half a percent for rounding's sake.
+    # |p − q|² ≤ R² + 2 R h sin φ + h² for an element at h.
     lever = array.half * sine
     nearest = array.half
-    farthest = 0.995 * (float(np.sqrt(lever**2 + limit**2 - nearest**2)) - lever)
-    if farthest < 2 * nearest:
+    farthest = REACH_MARGIN * (float(np.sqrt(lever**2 + limit**2 - nearest**2)) - lever)
+    if farthest < LEAST_DEPTH * nearest:
         raise MeasurementError(
             f"frequency: the steps are unambiguous to {limit:.3g} m only, less than twice the "
             f"aperture's diagonal of {2 * array.half:.3g} m; take smaller frequency steps"

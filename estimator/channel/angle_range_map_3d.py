@@ -15,7 +15,15 @@ from estimator.measurement.model import Uplink
 from estimator.results.estimate import DirectionMap
 
 SAMPLES = 1.5
-"""Samples for each −3 dB width: a peak between them loses 2 dB at most, and is refined."""
+"""Samples for each −3 dB width: between them a peak loses 1.3 dB at most on each axis; it is only
+the start of a fit. [-]"""
+
+PROFILE_SAMPLES = 4
+"""Samples of a delay profile for each independent delay. [-]"""
+
+SPREAD = 0.1
+"""What a wave's peak in the mean profile keeps of its power at least, as it is spread over the
+delays along the aperture and falls between samples. [-]"""
 
 
 def direction_map(
@@ -80,16 +88,31 @@ def lengths_with_energy(
     """Tell at which path lengths a wave with such a share of the energy may arrive.
 
     Such a wave's profile over delay, averaged over the elements, peaks at its share of the mean
-    power; along a slanted aperture the peak walks by up to its diagonal, over which it is
-    searched, and spread, for which (and for what falls between samples) a tenth is allowed.
+    power. Along a slanted aperture the peak moves by up to the aperture's diagonal, within which
+    lengths are kept, and is spread (:data:`SPREAD`).
+
+    Parameters
+    ----------
+    uplink
+        With positions in the array's frame.
+    lengths
+        Path lengths to be told apart. [m]
+    array
+        Its extents.
+    least_share
+        Share of the energy. [-]
+
+    Returns
+    -------
+    Whether each length is within reach of such energy, boolean, one for each length.
     """
     window = np.hanning(uplink.frequencies.size + 2)[1:-1]
-    size = 4 * uplink.frequencies.size
+    size = PROFILE_SAMPLES * uplink.frequencies.size
     profile = np.fft.ifft(uplink.samples * (window / window.sum() * size), n=size, axis=1)
     power = np.mean(np.abs(profile) ** 2, axis=0)
     step = float(uplink.frequencies[1] - uplink.frequencies[0])
     cell = speed_of_light / (step * size)
-    bright = np.flatnonzero(power > 0.1 * least_share * np.mean(np.abs(uplink.samples) ** 2))
+    bright = np.flatnonzero(power > SPREAD * least_share * np.mean(np.abs(uplink.samples) ** 2))
     margin = array.half + cell
     if bright.size == 0:
         return np.zeros(lengths.size, dtype=bool)

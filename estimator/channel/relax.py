@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import (
     X_AXIS,
     Y_AXIS,
@@ -37,6 +38,19 @@ from estimator.wavefronts.wave_fit_2d import (
 CELLS = 2.0
 """Samples of the map for each -3 dB cell, in each direction, to start the refinement. [-]"""
 
+LEAST_SINE = 0.05
+"""Sine of the angle from the array's axis from which waves are looked for: within 3° of the axis a
+linear array's wavefront does not depend on the angle. [-]"""
+
+ROUNDING = 1e-9
+"""Residual over the pilot, both rms, at which nothing but rounding is left. [-]"""
+
+SAME_WAVE = 0.98
+"""Normalised inner product of two waves from which the data cannot tell them apart. [-]"""
+
+MOST_PATHS = 8
+"""Number of paths at which the search ends, by default. [-]"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PathPeak:
@@ -52,8 +66,8 @@ class PathPeak:
 def extract_paths(
     uplink: Uplink,
     *,
-    false_alarm_rate: float = 1e-3,
-    most: int = 8,
+    false_alarm_rate: float = false_alarm.PATH,
+    most: int = MOST_PATHS,
     longest: float | None = None,
     axis: Float[np.ndarray, " 3"] = X_AXIS,
     boresight: Float[np.ndarray, " 3"] = Y_AXIS,
@@ -88,11 +102,10 @@ def extract_paths(
         )
     local = _in_array_frame(uplink, axis, boresight)
     angles = default_angles(local, cells=CELLS)
-    # The ends of the axis are no directions of a wave that a linear array could refine.
-    angles = angles[(np.sin(angles) > 0.05)]
+    angles = angles[(np.sin(angles) > LEAST_SINE)]
     lengths = default_path_lengths(local, longest=longest, cells=CELLS)
     cells = angles.size * lengths.size / CELLS**2
-    threshold = float(np.log(cells / false_alarm_rate))
+    threshold = false_alarm.threshold(false_alarm_rate, cells=cells)
     found: FittedWaves | None = None
     excess: list[float] = []
     residual = local
@@ -111,8 +124,8 @@ def extract_paths(
         found = candidate
         excess.append(10 * np.log10(power / threshold))
         residual = replace(local, samples=found.residual)
-        if np.linalg.norm(found.residual) <= 1e-9 * np.linalg.norm(local.samples):
-            break  # nothing but rounding is left
+        if np.linalg.norm(found.residual) <= ROUNDING * np.linalg.norm(local.samples):
+            break
     return _described(local, found, excess) if found else ()
 
 
@@ -186,7 +199,7 @@ def _coincide(uplink: Uplink, found: FittedWaves) -> bool:
     )
     waves = waves / np.linalg.norm(waves, axis=1, keepdims=True)
     overlap = np.abs(waves.conj() @ waves.T) - np.eye(len(waves))
-    return bool(overlap.max() > 0.98)
+    return bool(overlap.max() > SAME_WAVE)
 
 
 def _described(uplink: Uplink, found: FittedWaves, excess: list[float]) -> tuple[PathPeak, ...]:

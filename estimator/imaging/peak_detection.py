@@ -4,16 +4,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import maximum_filter
 
-FALSE_ALARM = 1e-6
-"""Probability that a pixel of pure background counts as significant. [-]."""
-
+from estimator import false_alarm
 
 DYNAMIC_RANGE = 3e-5
-"""Intensity below the image's peak that may be a sidelobe of it (−45 dB). [-]."""
-
+"""Intensity over the image's highest below which a peak may be its sidelobe (−45 dB): the survey's
+taper has sidelobes of −50 dB, and errors of positions and gain add some. [-]"""
 
 MOST_PEAKS = 400
-"""Strongest peaks searched: the search is over all their pairs."""
+"""Strongest peaks that are searched for lines: the search takes all their pairs, and the time of
+pairs times peaks. A wall shows one peak for every cell or two. [-]"""
 
 
 def significant_peaks(
@@ -33,13 +32,25 @@ def significant_peaks(
     Where the peaks are [m]; the background is taken to be exponentially distributed, with
     the image's median.
     """
-    background = mean_background(intensity)
-    threshold = max(-np.log(FALSE_ALARM) * background, DYNAMIC_RANGE * float(intensity.max()))
+    threshold = peak_threshold(mean_background(intensity), float(intensity.max()))
     rows, columns = np.nonzero(
         (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
     )
     order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
     return points[rows[order], columns[order]]
+
+
+def peak_threshold(background: float, highest: float) -> float:
+    """Return the intensity from which a local maximum is neither noise nor a sidelobe.
+
+    Parameters
+    ----------
+    background
+        Mean intensity of what is no echo. [-]
+    highest
+        Intensity of the image's brightest pixel. [-]
+    """
+    return max(false_alarm.threshold(false_alarm.PIXEL) * background, DYNAMIC_RANGE * highest)
 
 
 def mean_background(intensity: Float[np.ndarray, "*n"]) -> float:

@@ -26,6 +26,13 @@ UNEVEN_STEPS = 1e-3
 """Departure from a uniform frequency grid, over the step, from which on the profiles are
 summed as they are: at the far end of the unambiguous range it is a phase of 2π·1e-3. [-]"""
 
+OFF_GRID = 1e-2
+"""Departure from a grid with holes, over its step, from which on the median step counts: over a
+hundred steps it would alias to another range. [-]"""
+
+NUFFT_ERROR = 1e-6
+"""Relative error of the non-uniform FFT: that of the float32 it is stored in. [-]"""
+
 _ORDER = 4  # coefficients of a cubic
 
 
@@ -124,8 +131,7 @@ def unambiguous_path(frequencies: Float[np.ndarray, " freqs"]) -> float:
     multiples = np.rint(steps / smallest)
     grid = float((frequencies[-1] - frequencies[0]) / multiples.sum())
     places = (frequencies - frequencies[0]) / grid
-    # A hundredth: a step that is off by more would alias to another range by then.
-    if np.abs(places - np.rint(places)).max() > 1e-2:
+    if np.abs(places - np.rint(places)).max() > OFF_GRID:
         grid = float(np.median(steps))
     return speed_of_light / grid
 
@@ -164,7 +170,7 @@ def _nonuniform(
     # finufft counts its modes from -cells/2; the shift moves cell 0 there.
     shifted = cubic * np.exp(1j * phase * (cells // 2))[None, :, None]
     strengths = np.ascontiguousarray(shifted.transpose(0, 2, 1)).reshape(-1, freqs)
-    sums = finufft.nufft1d1(phase, strengths, cells, eps=1e-6, isign=1, nthreads=1)
+    sums = finufft.nufft1d1(phase, strengths, cells, eps=NUFFT_ERROR, isign=1, nthreads=1)
     table = np.empty((channels, cells, order), dtype=np.complex64)
     table[:] = sums.reshape(channels, order, cells).transpose(0, 2, 1)
     return table

@@ -10,6 +10,12 @@ from estimator.measurement.model import Echo, Uplink, frequency_step
 
 Measured = TypeVar("Measured", Echo, Uplink)
 
+HANN_REACH = 12.0
+"""Decimated period over the reach on either side: a Hann block loses 1 dB at a twelfth of it. [-]
+"""
+FEWEST_BLOCKS = 8
+"""Frequencies that are left at least; of fewer there is nothing to decimate. [-]"""
+
 
 def gated(measured: Measured, path_length: float, *, reach: float) -> Measured:
     """Keep what arrives near one length, and only as many frequencies as that needs.
@@ -29,10 +35,9 @@ def gated(measured: Measured, path_length: float, *, reach: float) -> Measured:
     """
     passes = 2 if isinstance(measured, Echo) else 1
     unambiguous = speed_of_light / (passes * frequency_step(measured.frequencies))
-    # A Hann block of 2·hop points loses 1 dB at a twelfth of the decimated period.
-    hop = int(unambiguous / (12 * reach))
+    hop = int(unambiguous / (HANN_REACH * reach))
     blocks = (measured.frequencies.size - 1) // max(hop, 1) - 1
-    if hop < 2 or blocks < 8:
+    if hop < 2 or blocks < FEWEST_BLOCKS:
         return measured
     window = np.sin(np.pi * np.arange(1, 2 * hop) / (2 * hop)) ** 2
     window = window / window.sum()

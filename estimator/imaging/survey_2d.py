@@ -1,4 +1,4 @@
-"""A first, coarse image of all that a linear array reaches, and its peaks."""
+"""The survey of a linear array: a coarse image of all that it reaches, and its peaks."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,21 @@ from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
 
-REFLECTED = 0.5
-"""Coherence, as that of a mirror facing the array, of what does reflect it. [-]"""
+STEP = 0.75
+"""Spacing of the image's grid in range and sine, over the untapered cell: 0.49 of the cell of the
+survey's taper, so that a peak between pixels loses 0.9 dB at most along each axis. [-]"""
 
+REFLECTED = 0.5
+"""Coherence, with the wavefront of a mirror that faces the array, from which a peak is the array's
+reflection in it: an ideal mirror has 1, and half of the array in it has 0.5. [-]"""
 
 FACE = 1e-2
-"""Intensity of a facing surface's peaks over that of its reflection. [-]"""
+"""Intensity of a facing surface's own peaks, over that of its reflection: the sidelobes of the
+reflection in its range are weaker, as the taper's are −50 dB. [-]"""
 
+FACE_DEPTH = 2.0
+"""Distance in range within which peaks belong to one facing surface: the half width of the survey's
+range lobe down to its first null. [cells c/2B]"""
 
 MOST_GAIN = 1.2
 """Intensity that a bend of the wavefront may add to a peak; on full-wave data with two ghosts
@@ -56,9 +64,9 @@ def survey(echo: Echo) -> Survey:
     """
     resolution = echo_resolution(echo)
     nearest, farthest = echo_reach(echo)
-    ranges = np.arange(nearest, farthest, 0.75 * resolution.along_ray)
+    ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)
     limit = imaged_sine(echo)
-    count = 2 * int(np.ceil(limit / (0.75 * resolution.across_ray))) + 1
+    count = 2 * int(np.ceil(limit / (STEP * resolution.across_ray))) + 1
     sines = np.linspace(-limit, limit, count)
     points = np.zeros((ranges.size, count, 3))
     points[..., 0] = ranges[:, None] * sines
@@ -103,6 +111,6 @@ def _faces(
     belongs = np.zeros(len(peaks), dtype=bool)
     for flash in np.flatnonzero(as_mirror >= REFLECTED):
         ray = peaks[flash] / np.linalg.norm(peaks[flash])
-        level = np.abs((peaks - peaks[flash]) @ ray) < 2 * resolution.along_ray
+        level = np.abs((peaks - peaks[flash]) @ ray) < FACE_DEPTH * resolution.along_ray
         belongs |= level & (intensity > FACE * intensity[flash])
     return belongs

@@ -8,6 +8,7 @@ import scipy.ndimage
 from jaxtyping import Complex, Float
 from scipy.spatial import cKDTree
 
+from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray, planar_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.path_tracing_3d import folded_over
@@ -19,7 +20,6 @@ from estimator.geometry.specular_chains_3d import (
     unfolded_in_space,
 )
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
-from estimator.imaging.peak_detection import FALSE_ALARM
 from estimator.imaging.survey_3d import VolumeSurvey, survey_volume
 from estimator.measurement.model import Echo
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
@@ -204,7 +204,7 @@ def _targets(
     ranges, along, up = np.meshgrid(looked.ranges, looked.along, looked.up, indexing="ij")
     ahead = np.sqrt(np.maximum(1 - along**2 - up**2, 0.0))
     points = ranges[..., None] * np.stack([along, ahead, up], axis=-1)
-    free = intensity > -np.log(FALSE_ALARM) * looked.background
+    free = intensity > false_alarm.threshold(false_alarm.PIXEL) * looked.background
     for wall in planes:
         flat = points[free]
         beside = np.abs((flat - wall.centre) @ wall.normal)

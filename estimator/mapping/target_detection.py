@@ -18,7 +18,7 @@ from estimator.mapping.diffuse_multipath import between, in_cloud
 from estimator.mapping.wall_unfolding import FoldedWalls, place_covariance
 from estimator.results.estimate import Target
 from estimator.walls.fitted_line import FittedLine
-from estimator.walls.line_relations import lies_on
+from estimator.walls.line_relations import BEYOND_END, lies_on
 
 LEAST_COHERENCE = 0.3
 """Of a target over the aperture: with a cloud as strong as itself in its own range it has 0.5;
@@ -99,7 +99,7 @@ def find_targets(
     spots = [
         _spot(looked, intensity, peak, bool(one), coarse)
         for peak, one in zip(looked.peaks, seen, strict=True)
-        if not any(lies_on(peak, line, coarse, margin=4.0) for line in found)
+        if not any(lies_on(peak, line, coarse, margin=BEYOND_END) for line in found)
     ]
     faces = [
         _face(index, folded)

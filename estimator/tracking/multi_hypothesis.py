@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from estimator import false_alarm
 from estimator.results.estimate import UserEstimate
 from estimator.tracking.constant_velocity import State, acceleration_noise, moved, smoothed, updated
 
@@ -28,16 +29,21 @@ ACCELERATION = 0.5
 over the second that it lasts. [m²/s³]"""
 SPEED = 1.5
 """Standard deviation of each coordinate of the velocity before anything is known of it. [m/s]"""
-GATE = 0.999
+GATE = 1 - false_alarm.DISAGREEMENT
 """Probability with which the true fix is inside the gate. [-]"""
 OUTLIER_SHARE = 0.05
-"""Probability that a fix is somewhere else altogether. [-]"""
+"""Prior probability that a fix is none of the user's: above the share of wrong answers that the
+trap rooms show, so that one outlier does not win against a track. [-]"""
 REGION = 10.0
-"""Length of the square or cube over which outliers, and users at first, are spread. [m]"""
+"""Side of the square or cube over which outliers, and users at first, are spread: a large room. It
+enters as its logarithm. [m]"""
 MOST_CHOICES = 16
-"""Sequences of choices that are followed at once."""
+"""Hypotheses that are followed at once: four ambiguous fixes in a row with two candidates each. [-]
+"""
 LEAST_SHARE = 1e-9
-"""Probability over the best sequence's below which one is given up. [-]"""
+"""Probability over the best hypothesis' below which one is given up. [-]"""
+IN_PLANE = 1e-6
+"""Distance across a plane by which fixes of the plane may differ: rounding. [m]"""
 FLAT = 1e-9
 """Variance over the largest one below which a direction is known by assumption: a linear array
 locates in its own plane. [-]"""
@@ -277,7 +283,7 @@ def _off_plane(fixes: Sequence[Fix], axes: Float[np.ndarray, "free 3"]) -> Float
     places = np.concatenate([one.positions for one in fixes])
     across = places - places @ axes.T @ axes
     worst = float(np.abs(across - across[0]).max())
-    if worst > 1e-6:
+    if worst > IN_PLANE:
         raise ValueError(
             f"positions differ by {worst:.3g} m in a direction in which their covariances are 0; "
             "give fixes of one plane, or covariances of all three coordinates"

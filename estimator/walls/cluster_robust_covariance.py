@@ -1,11 +1,13 @@
-r"""The covariance of a line from the pushes of its parts, none of which is trusted to judge itself.
+r"""The cluster-robust covariance of a fitted line, with the bias correction for few clusters.
 
-Least squares along a wall end with the pushes :math:`p_i` of all places in balance. What an
-estimate scatters by follows from them, :math:`K^{-1} \sum p_b p_b^T K^{-1}` over independent
-parts b with the normal matrix K, but a part that holds much of K has pulled the line to where its
-own push is small: over a wall that shows a few glints only, the sum is far too small. Each part's
-push is therefore divided by the root of what the others hold, :math:`(1 - K_b K^{-1})^{1/2}`,
-which makes the covariance unbiased where all parts push alike [1]_.
+At the least-squares minimum the scores :math:`p_i` of all places (derivatives of half the sum of
+squares by the parameters) add up to 0. With the normal matrix K, and places grouped into parts b
+that are independent of each other, the estimate has the covariance
+:math:`K^{-1} (\sum_b p_b p_b^T) K^{-1}` (the "sandwich"). A part that holds much of K pulls the
+line to itself, so that its own score is small: on a wall that shows a few glints only, the sandwich
+is far too small. Each part's score is therefore divided by :math:`(1 - K_b K^{-1})^{1/2}`, which
+makes the covariance unbiased where the errors of all parts have the same variance (the "CR2"
+estimator of [1]_).
 
 References
 ----------
@@ -19,11 +21,11 @@ from jaxtyping import Float, Int
 FEWEST_PARTS = 4
 """Parts that a line is cut into, however short it is: two of them fit any tilt and offset."""
 LEAST_LEFT = 1e-3
-"""Least share of the normal matrix that is taken to lie outside a part: a line that stands on
-one glint is not known, and its variance is large, not infinite. [-]"""
+"""Least share of the normal matrix that is taken to lie outside a part: where one glint holds all
+of it, the covariance is large (a thousand times the sandwich's), not infinite. [-]"""
 TIE = 1e-6
-"""By how much a place may lie before a cut and still belong after it: evenly spaced places lie on
-cuts but for rounding, which must not decide. [parts]"""
+"""Distance before the border of a part at which a place still belongs after it: evenly spaced
+places lie on borders up to rounding, which must not decide. [parts]"""
 
 
 def clustered_covariance(
@@ -34,26 +36,26 @@ def clustered_covariance(
     *,
     part: float,
 ) -> Float[np.ndarray, "parameters parameters"]:
-    """Return the covariance of parameters from what pushes them, place by place.
+    """Return the covariance of a line's parameters from the scores of its places.
 
     Parameters
     ----------
     places
         Along the line, ascending. [m]
     designs
-        By how much each place moves with each parameter.
-    pushes
-        Of each place, at the minimum: half of what the sum of squares would gain by its move.
+        Displacement of each place by each parameter.
+    scores
+        Derivative of half the sum of squares by each place's displacement, at the minimum, with
+        the sign of a gain.
     gains
-        How much each place's push changes with each parameter: the normal matrix is
+        Decrease of each place's score with each parameter: the normal matrix is
         ``designs.T @ gains``.
     part
-        Length within which places push with or against each other. [m]
+        Length over which the errors of places are correlated. [m]
 
     Returns
     -------
-    The mean over two cuts of the line into parts, the second half a part on, so that no place
-    is always at an edge.
+    The mean over two divisions of the line into parts, the second shifted by half a part.
 
     Raises
     ------

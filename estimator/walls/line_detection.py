@@ -17,6 +17,25 @@ FEWEST_INLIERS = 5
 """Peaks that make a line. Of n ≤ 400 peaks thrown at random over an area of hundreds of cells
 across, some line through two of them meets 6 more with a probability below 1e-3."""
 
+TOLERANCE = 0.5
+"""Distance across a line within which a peak is on it: a pixel of the survey is 0.49 cells. [cells]
+"""
+
+LEAST_APART = 3.0
+"""Distance of two peaks that are tried as a line: of closer ones, each known to half a cell, the
+direction is not known to 10°. [cells]"""
+
+SKIRT = 2.0
+"""Distance across a line that was found within which peaks are its sidelobes: the survey's main
+lobe ends at 1.4, and a candidate is off by half a cell. [cells]"""
+
+BEYOND_END = 3.0
+"""Distance beyond the ends of a line that was found within which peaks are its sidelobes, or its
+speckle once more. [cells]"""
+
+PAIRS_AT_ONCE = 4_000_000
+"""Distances between lines and peaks that are held at once: 32 MB. [-]"""
+
 GAP = 7.0
 """Cells without a peak that end a wall; speckle alone leaves so wide a gap with a
 probability below 1e-3 for each cell. [cells]"""
@@ -58,7 +77,7 @@ def find_lines(
         found.append(candidate)
         # The line's own peaks go, and the skirt of sidelobes beside it.
         unassigned = unassigned[
-            ~(members | _on_segment(unassigned, candidate, resolution, tolerance=2.0))
+            ~(members | _on_segment(unassigned, candidate, resolution, tolerance=SKIRT))
         ]
     return tuple(found)
 
@@ -70,11 +89,11 @@ def _best_line(
     along = peaks[second] - peaks[first]
     length = np.linalg.norm(along, axis=-1)
     cells = resolution.along_ray + resolution.across_ray * np.linalg.norm(peaks[first], axis=-1)
-    apart = length > 3 * cells  # closer pairs point nowhere
+    apart = length > LEAST_APART * cells
     first, along, length = first[apart], along[apart], length[apart]
     best: tuple[int, np.ndarray] | None = None
     for pairs in np.array_split(
-        np.arange(len(first)), max(1, len(first) * len(peaks) // 4_000_000)
+        np.arange(len(first)), max(1, len(first) * len(peaks) // PAIRS_AT_ONCE)
     ):
         directions = along[pairs] / length[pairs, None]
         near = _near_lines(peaks, peaks[first[pairs]], directions, resolution)
@@ -93,7 +112,7 @@ def _near_lines(
     origins: Float[np.ndarray, "lines 3"],
     directions: Float[np.ndarray, "lines 3"],
     resolution: Resolution,
-    tolerance: float = 0.5,
+    tolerance: float = TOLERANCE,
 ) -> Bool[np.ndarray, "lines peaks"]:
     normals = np.stack([directions[:, 1], -directions[:, 0]], axis=-1)
     plane = peaks[:, :2]
@@ -137,7 +156,7 @@ def _on_segment(
     length = float(np.linalg.norm(along))
     direction = along / length
     places = (peaks - line.start) @ direction
-    margin = 3 * resolution.cell(peaks, direction)
+    margin = BEYOND_END * resolution.cell(peaks, direction)
     beside = _near_lines(peaks, line.start[None], direction[None], resolution, tolerance)[0]
     members: np.ndarray = beside & (places > -margin) & (places < length + margin)
     return members

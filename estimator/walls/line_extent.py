@@ -23,6 +23,9 @@ CELLS_AT_END = 12.0
 CELLS_OF_STEP = 3.0
 """Cells either side of an end whose mean levels differ most: speckle in so many leaves their mean
 a deviation of 3 dB, and walls end by tens of decibels."""
+LEAST_LIT = 0.3
+"""Share of the places between a wall's first and last bright ones that are bright: of speckle down
+to the halfway level nearly all are, of a few unconnected glints few. [-]"""
 END_LEVEL = 0.1
 """Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
 of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
@@ -57,7 +60,7 @@ def lit_extent(
         return None
     runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
     run = max(runs, key=len)
-    if len(run) < 2 or len(run) < 0.3 * (run[-1] - run[0] + 1):
+    if len(run) < 2 or len(run) < LEAST_LIT * (run[-1] - run[0] + 1):
         return None
     level_db = 10 * np.log10(np.maximum(intensity, halfway))
     outermost = len(places) - 1
@@ -95,14 +98,12 @@ def end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:
 
 
 PLACES_PER_CELL = 4
-
-
+"""Samples along a face: its end is found to a quarter of a cell. [-]"""
 ASIDE = 0.75
-"""Cells along the face to either side of which each place is as bright as the brightest. [cells]"""
-
-
+"""Half width of the neighbourhood along the face whose brightest place counts: within a cell and a
+half speckle has a maximum. [cells]"""
 RANGE_SHIFTS = np.linspace(-0.5, 0.5, 3)
-"""Ranges that are tried, about the line's. [cells]"""
+"""Ranges that are tried, about the line's: the line is known to half a cell there. [cells]"""
 
 
 def face_ends(

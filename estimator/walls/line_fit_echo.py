@@ -40,16 +40,21 @@ OVERSAMPLING = 1.2
 """Scatterers of the row, over those that hold all of the speckle that the echo can show. Fewer
 leave a part of it unexplained; more change nothing."""
 RANGE_MARGIN = 10
-"""Bins of the range profiles before the nearest scatterer and beyond the farthest."""
+"""Bins of the range profiles before the nearest scatterer and beyond the farthest: Dirichlet's
+sidelobes fall below 1/10π of the peak there, −30 dB. [bins]"""
 SAME_RANGE = 4.0
-"""Parts of a wall whose ranges differ by less are told apart by their angle. [bins]"""
+"""Parts of a wall whose ranges differ by less are resolved by their angle. [bins]"""
 SECTOR_MARGIN = 1.25
-"""Sines that antenna positions must tell apart, over those of such parts. [-]"""
+"""Width of the sector in sine that the kept antenna positions sample without ambiguity, over that
+of such parts. [-]"""
 FEWEST_POSITIONS = 64
-"""Antenna positions that are kept in any case."""
+"""Antenna positions that are kept in any case: each adds its noise to the average. [-]"""
 RIDGE = 1e-6
-"""Added to the scatterers' Gram matrix, over its mean diagonal: finer than a cell they are not
-independent."""
+"""Added to the scatterers' Gram matrix, over its mean diagonal: scatterers finer than a cell are
+not independent, and float64 still solves the sum to 1e-10. [-]"""
+PLACES_OF_BAND, PLACES_OF_RANGE, PLACES_OF_SECTOR = 9, 33, 129
+"""Places along a wall at which the bandwidth, the ranges and the sector of its echo are looked up;
+all of them vary smoothly. [-]"""
 STEPS = 2
 """Gauss-Newton steps: from a hundredth of a cell the first leaves less than a thousandth."""
 FARTHEST_STEP = 0.5
@@ -188,7 +193,7 @@ def _bandwidth_along(
     A place's echo goes through 2f/c times the cosine between its ray and the wall.
     """
     along = (end - start) / np.linalg.norm(end - start)
-    cosines = _range_slopes(echo, np.linspace(start, end, 9), along)
+    cosines = _range_slopes(echo, np.linspace(start, end, PLACES_OF_BAND), along)
     edges = 2 / speed_of_light * echo.frequencies[[0, -1], None, None] * cosines
     return float(np.max(edges.max(axis=(0, 1)) - edges.min(axis=(0, 1))))
 
@@ -200,7 +205,7 @@ def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, 
     seen at a slant these are few, and on one that faces the array all of it.
     """
     x = echo.positions[:, 0]
-    points = np.linspace(start, end, 129) - echo.positions.mean(axis=0)
+    points = np.linspace(start, end, PLACES_OF_SECTOR) - echo.positions.mean(axis=0)
     ranges = np.linalg.norm(points, axis=-1)
     sines = points[:, 0] / ranges
     near = SAME_RANGE * _sweep(echo).bin_width
@@ -256,7 +261,7 @@ def _profiles(
 ) -> _Profiles:
     """Range profiles around the wall, at the sweep's own independent ranges."""
     sweep = _sweep(echo)
-    ranges = _ranges(echo, np.linspace(start, end, 33))
+    ranges = _ranges(echo, np.linspace(start, end, PLACES_OF_RANGE))
     low = int(np.floor(ranges.min() / sweep.bin_width)) - RANGE_MARGIN
     high = int(np.ceil(ranges.max() / sweep.bin_width)) + RANGE_MARGIN
     bins = np.arange(low, min(high, low + sweep.count - 1) + 1) * sweep.bin_width

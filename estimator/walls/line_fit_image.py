@@ -39,10 +39,18 @@ from estimator.walls.line_sampling import (
     trial_points,
 )
 
+NEIGHBOURHOODS = (1.0, 0.3)
+"""Half width over which J is maximised: once before the extent is known, once after. [cells]"""
+TILT_RANGE = 2.0
+"""Largest displacement of an end by a trial tilt, over that by a trial offset: the tilt of a line
+between ends that are known to a cell each is so uncertain. [-]"""
 TRIALS = 9
 """Trial angles and trial offsets of each round."""
 ROUNDS = 4
-"""Rounds; each looks at a third of the neighbourhood of the one before."""
+"""Grids of trials, each finer than the one before: to 1/27 of the first one's width. [-]"""
+NARROWER = 3
+"""Width of a round's neighbourhood over the next one's: 1.3 steps of the grid on either side. [-]
+"""
 MODES = 10
 """Smooth modes along the wall that tell how strongly speckle pushes a line: the weight times
 polynomials, orthonormal, so that order 0 is what moves the line and order 1 what tilts it. Both
@@ -105,7 +113,7 @@ def fit_line(
     -------
     The line, or ``None`` if nothing wall-like is left on it.
     """
-    for half_width in (1.0, 0.3):  # in cells: once for the extent, once at the final extent
+    for half_width in NEIGHBOURHOODS:
         refined = _refined(focus, start, end, resolution, half_width)
         extent = lit_extent(tapered, *refined, resolution, reach)
         if extent is None:
@@ -162,13 +170,13 @@ def _refined(
     length = float(np.linalg.norm(end - start))
     tilt = offset = 0.0
     for _ in range(ROUNDS):
-        tilts = tilt + np.linspace(-2, 2, TRIALS) * width / length
+        tilts = tilt + np.linspace(-TILT_RANGE, TILT_RANGE, TRIALS) * width / length
         offsets = offset + np.linspace(-1, 1, TRIALS) * width
         magnitude = np.abs(focus(trial_points(start, end, places, tilts, offsets)))
         objective = magnitude.sum(axis=-1)
         row, column = np.unravel_index(int(np.argmax(objective)), objective.shape)
         tilt, offset = float(tilts[row]), float(offsets[column])
-        width /= 3
+        width /= NARROWER
     ends = trial_points(
         start, end, np.array([-length / 2, length / 2]), np.array([tilt]), np.array([offset])
     )[0, 0]

@@ -16,18 +16,21 @@ from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_fit_echo import CoherentLine, fit_coherently
-from estimator.walls.line_relations import lies_on
+from estimator.walls.line_relations import BEYOND_END, lies_on
 
 DISAGREEMENT = 6.0
 """Square of what image and echo differ by, over both covariances, beyond which neither is right
 about its own. Of 116 lines in 33 rooms it was 5 to 16 in corners, and 3.3 at most elsewhere; on
 walls of 2 mm correlation, which show a few glints only, it may be as large. [-]"""
-LINE_MARGIN = 4.0
-"""Cells by which a wall may be longer than its line at either end. [cells]"""
 MOST_BESIDE = 12
-"""Things brighter than a wall that are told apart from its echo; weaker ones do not pull it."""
+"""Things brighter than a wall that are told apart from its echo; weaker ones do not pull it. Each
+adds nine unknowns to the fit. [-]"""
+BESIDE_STEPS = np.array([-0.5, 0.0, 0.5])
+"""Places along and across the ray at which such a thing may scatter: it is no ideal point. [cells]
+"""
 CUT_SHARE = 0.3
-"""Part of its length by which a wall may go on where the unambiguous range ends. [-]"""
+"""Part of its length by which a wall may go on where the unambiguous range ends. Nothing is seen
+there that could tell more; a row too long costs precision, one too short turns the line. [-]"""
 
 MOST_DEVIATIONS = 6.0
 """Deviations of the image's line, of its tilt and its offset together, beyond which a row that
@@ -77,7 +80,7 @@ def _bright_beside(
     Each is a few points, half a cell apart: what stands there is no ideal point.
     """
     beside = np.array(
-        [p for p in peaks if not any(lies_on(p, line, coarse, margin=4.0) for line in lines)]
+        [p for p in peaks if not any(lies_on(p, line, coarse, margin=BEYOND_END) for line in lines)]
     ).reshape(-1, 3)
     intensity = np.abs(tapered(beside)) ** 2
     brightest = np.argsort(-intensity)[:MOST_BESIDE]
@@ -85,11 +88,10 @@ def _bright_beside(
     distance = np.linalg.norm(beside, axis=-1, keepdims=True)
     ray = beside / distance
     sideways = np.stack([ray[:, 1], -ray[:, 0], ray[:, 2]], axis=-1) * distance * coarse.across_ray
-    steps = np.array([-0.5, 0.0, 0.5])
     grid = (
         beside[:, None, None]
-        + steps[:, None, None] * coarse.along_ray * ray[:, None, None]
-        + steps[:, None] * sideways[:, None, None]
+        + BESIDE_STEPS[:, None, None] * coarse.along_ray * ray[:, None, None]
+        + BESIDE_STEPS[:, None] * sideways[:, None, None]
     )
     return grid.reshape(-1, 9, 3), intensity[brightest]
 
@@ -100,8 +102,8 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
     along = float(resolution.cell(line.middle, line.direction))
     beyond = [
         CUT_SHARE * line.length
-        if np.linalg.norm(tip) > farthest - LINE_MARGIN * along
-        else LINE_MARGIN * along
+        if np.linalg.norm(tip) > farthest - BEYOND_END * along
+        else BEYOND_END * along
         for tip in (line.start, line.end)
     ]
     found = fit_coherently(

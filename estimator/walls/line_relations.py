@@ -10,7 +10,27 @@ from estimator.geometry.wall_2d import crossing, mirrored
 from estimator.walls.fitted_line import FittedLine
 
 EDGE_DEVIATIONS = 3.0
-"""Deviations of its angle by which a wall must miss the array to show it one face. [-]"""
+"""Deviations of its angle by which a wall must miss the array to show it one face: one in 370
+walls that point at the array passes for one that does not. [-]"""
+
+BESIDE = 2.0
+"""Distance across a line within which a point is on it: the survey's main lobe ends at 1.4 cells,
+and a candidate line is off by half a cell. [cells]"""
+
+BEYOND_END = 4.0
+"""Distance beyond a line's end within which a peak belongs to it: the ends are found to a few
+cells, as speckle hides the last ones. [cells]"""
+
+GOOD_PART = 1 / 3
+"""Share of a line on another from which both are one wall, or behind others from which it is
+hidden. Two views of one wall share more, as each is followed to its ends; two walls that cross
+share the cells of the crossing. [-]"""
+
+MOST = 0.5
+"""Share of a line, mirrored, that must be on a wall to prove it: most of it. [-]"""
+
+SAMPLES = 9
+"""Points of a line at which such shares are counted, ends included. [-]"""
 
 
 def hides(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
@@ -27,12 +47,24 @@ def lies_on(
     *,
     margin: float = 0.0,
 ) -> bool:
-    """Tell whether a point is on a segment, within two cells across and a margin along it."""
+    """Tell whether a point is on a segment.
+
+    Parameters
+    ----------
+    point
+        In the array's frame. [m]
+    line
+        The segment.
+    resolution
+        Of the image that the point comes from.
+    margin
+        Distance beyond either end that still counts; across, it is :data:`BESIDE`. [cells]
+    """
     normal = line.normal
     beside = abs(float((point - line.middle) @ normal))
     along = abs(float((point - line.middle) @ line.direction))
     reach = 0.5 * line.length + margin * float(resolution.cell(point, line.direction))
-    return beside < 2 * float(resolution.cell(point, normal)) and along < reach
+    return beside < BESIDE * float(resolution.cell(point, normal)) and along < reach
 
 
 def _share_on(
@@ -43,20 +75,21 @@ def _share_on(
 ) -> float:
     """Return the share of a segment that lies on a line. [-]."""
     return float(
-        np.mean([lies_on(point, line, resolution) for point in np.linspace(start, end, 9)])
+        np.mean([lies_on(point, line, resolution) for point in np.linspace(start, end, SAMPLES)])
     )
 
 
 def overlap(line: FittedLine, other: FittedLine, coarse: Resolution) -> bool:
-    """Tell whether a good part of a line lies on another."""
-    return _share_on(line.start, line.end, other, coarse) > 1 / 3
+    """Tell whether more than :data:`GOOD_PART` of a line lies on another."""
+    return _share_on(line.start, line.end, other, coarse) > GOOD_PART
 
 
 def is_hidden(line: FittedLine, others: Sequence[FittedLine]) -> bool:
-    """Tell whether a good part of a line is behind others."""
-    points = np.linspace(line.start, line.end, 9)
+    """Tell whether more than :data:`GOOD_PART` of a line is behind others, seen from the array."""
+    points = np.linspace(line.start, line.end, SAMPLES)
     before = [other for other in others if other is not line]
-    return bool(np.mean([any(hides(one, point) for one in before) for point in points]) > 1 / 3)
+    hidden = [any(hides(one, point) for one in before) for point in points]
+    return bool(np.mean(hidden) > GOOD_PART)
 
 
 def seen_twice(
@@ -85,7 +118,7 @@ def seen_twice(
             for j, wall in enumerate(either):
                 if wall is image or wall is mirror or hides(mirror, wall.middle):
                     continue
-                if _share_on(ends[0], ends[1], wall, resolution) > 0.5:
+                if _share_on(ends[0], ends[1], wall, resolution) > MOST:
                     twice |= {i, j}
     return [either[i] for i in sorted(twice) if i >= len(known)]
 

@@ -11,7 +11,13 @@ from estimator.imaging.peak_detection import mean_background
 SAMPLES_PER_CELL = 2
 """Along the line. [-]"""
 CELLS_CUT = 2.0
-"""Cells left out at either end: the sidelobes of an end, which lean, would tilt the line."""
+"""Cells left out at either end: the sidelobes of an end, which lean, would tilt the line. [cells]
+"""
+MOST_CUT = 0.5
+"""Most that is left out of a short line, over its length. [-]"""
+BESIDE = np.array([-12.0, -10.0, -8.0, -6.0, 0.0, 6.0, 8.0, 10.0, 12.0])
+"""Parallel lines at which brightness is compared, the line itself in the middle: from 6 cells on
+the taper's sidelobes of the line are below −60 dB. [cells]"""
 
 
 def cell_along(
@@ -38,7 +44,7 @@ def places_along(
     """Sample a segment without its very ends, measured from its midpoint. [m]."""
     length = float(np.linalg.norm(end - start))
     cell = cell_along(start, end, resolution)
-    length -= min(2 * CELLS_CUT * cell, 0.5 * length)
+    length -= min(2 * CELLS_CUT * cell, MOST_CUT * length)
     count = max(2, round(per_cell * length / cell))
     places: np.ndarray = (np.arange(count) + 0.5) / count * length - length / 2
     return places
@@ -75,7 +81,7 @@ def levels(
     """Mean intensity along the line, and the median-based one of lines beside it."""
     places = places_along(start, end, resolution)
     cell = cell_across(start, end, resolution)
-    beside = cell * np.array([-12.0, -10.0, -8.0, -6.0, 0.0, 6.0, 8.0, 10.0, 12.0])
+    beside = cell * BESIDE
     points = trial_points(start, end, places, np.zeros(1), beside)[0]
     intensity = np.abs(focus(points)) ** 2
     on = len(beside) // 2

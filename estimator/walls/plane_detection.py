@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
+from estimator import false_alarm
 from estimator.array.resolution_cell import Resolution
 
 DRAWS = 6000
@@ -20,17 +21,30 @@ DRAWS = 6000
 FEWEST_INLIERS = 12
 """Peaks that make a plane, besides what chance demands. [-]"""
 
-FALSE_ALARM = 1e-3
-"""Probability that peaks strewn at random make any plane of those drawn. [-]"""
-
 TOLERANCE = 0.75
-"""Distance of a peak from its plane. [cells]"""
+"""Distance of a peak from its plane: the peak is known to half a pixel of 0.49 cells, and a plane
+through three such peaks is off by as much again where the others are. [cells]"""
+
+SKIRT = 2.0
+"""Distance from its plane, over :data:`TOLERANCE`, within which peaks beside a wall are its
+sidelobes: together 1.5 cells; the survey's main lobe ends at 1.4. [-]"""
 
 CLUMPED = 4.0
 """How much denser than strewn evenly over the volume the peaks of furniture may lie. [-]"""
 
 GAP = 6.0
 """Cells without a peak that end a wall. [cells]"""
+
+LEAST_SPAN = 4.0
+"""Side of the smallest square whose area three peaks must span to be tried as a plane: errors of
+half a cell turn a smaller one by more than 10°. [cells]"""
+
+MOST_REFUSED = 3
+"""Planes in turn whose largest patch has too few peaks, after which the search ends: they are
+what chance lines up across the room. [-]"""
+
+REFITS = 3
+"""Fits of the plane to the peaks near it, each with what the fit before it gained. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +80,7 @@ def find_planes(
     unassigned, refused = peaks, 0
     # The same peaks give the same planes: the draws are a part of the search, not of chance.
     rng = np.random.default_rng(0)
-    while len(unassigned) >= FEWEST_INLIERS and refused < 3:
+    while len(unassigned) >= FEWEST_INLIERS and refused < MOST_REFUSED:
         members = _best_plane(unassigned, resolution, (depth, width), rng)
         if members is None:
             break
@@ -78,7 +92,7 @@ def find_planes(
             continue
         centre, normal = _fitted(chosen)
         found.append(PlaneCandidate(centre=centre, normal=normal, members=chosen))
-        near = _near(unassigned, centre[None], normal[None], resolution, 2 * TOLERANCE)[0]
+        near = _near(unassigned, centre[None], normal[None], resolution, SKIRT * TOLERANCE)[0]
         unassigned = unassigned[~(members | (near & _beside(unassigned, chosen, resolution)))]
     return tuple(found)
 
@@ -94,13 +108,13 @@ def _best_plane(
     across = np.cross(second - first, third - first)
     area = np.linalg.norm(across, axis=1)
     cell = resolution.across_ray * np.linalg.norm(first, axis=1)
-    wide = area > (4 * cell) ** 2  # points closer together span no plane to speak of
+    wide = area > (LEAST_SPAN * cell) ** 2
     if not wide.any():
         return None
     near = _near(peaks, first[wide], across[wide] / area[wide, None], resolution, TOLERANCE)
     counts = near.sum(axis=1)
     best = int(np.argmax(counts))
-    # Peaks strewn at random: besides the three drawn, so many lie in the slab around the plane.
+    # Of peaks strewn at random the expected number, besides the three drawn, in the plane's slab.
     centre, normal = _fitted(peaks[near[best]])
     reach = float(np.linalg.norm(centre))
     radial = abs(float(normal @ centre)) / reach
@@ -108,10 +122,10 @@ def _best_plane(
     slab = 2 * TOLERANCE * float(resolution.cell(centre, normal))
     expected = CLUMPED * len(peaks) * slab / extent
     chance = float(poisson.sf(counts[best] - 4, expected)) * DRAWS
-    if counts[best] < FEWEST_INLIERS or chance > FALSE_ALARM:
+    if counts[best] < FEWEST_INLIERS or chance > false_alarm.PLANE:
         return None
     members = near[best]
-    for _ in range(3):  # the best of the drawn planes is still only one through three peaks
+    for _ in range(REFITS):  # the best of the drawn planes is still only one through three peaks
         centre, normal = _fitted(peaks[members])
         refined = _near(peaks, centre[None], normal[None], resolution, TOLERANCE)[0]
         if refined.sum() <= members.sum():

@@ -26,14 +26,24 @@ from estimator.imaging.focusing import Focus
 from estimator.imaging.peak_detection import DYNAMIC_RANGE, mean_background
 
 SUMMIT = 0.6
-"""Half the width over which a parabola is fitted. [cells]"""
+"""Half the width over which a parabola is fitted: the main lobe, sin x/x in magnitude, departs from
+the best one by 1 % of its peak there. [cells]"""
+FIRST_WIDTH = 1.5
+"""Half the width of the first search, by a grid: what consensus leaves is within it. [cells]"""
+GRID = np.linspace(-1.0, 1.0, 9)
+"""Tilts and offsets of that search, at the edges. [cells]"""
 DEPTHS = 9
-"""Samples of a parabola."""
+"""Samples of a parabola; the first search has three times as many. [-]"""
 CELLS_CUT = 1.5
-"""Cells left out around the rim."""
+"""Cells left out around the rim, whose sidelobes lean. [cells]"""
+MOST_CUT = 0.2
+"""Most that is left out of a small wall at each side, over its least extent. [-]"""
+FEWEST_POINTS = 9
+"""Points on a plane that three unknowns are fitted to: each counts three times. [-]"""
 MOST_POINTS = 3000
 """Points on the plane that are focused: more add time, but no cells."""
 ROUNDS = 3
+"""Paraboloids fitted one after the other, each about the summit of the one before. [-]"""
 LEAN = np.array([0.01, 0.01, 0.005])
 """Deviations of the edges by the tilts, and of the offset, that no average over the wall takes
 away: cells have sidelobes on other parts of the wall, which are brighter or darker. Under a beam of
@@ -42,15 +52,28 @@ found in the mean over six realisations (0.01 cells at the edges), and 0.004 cel
 [cells]"""
 CELLS_PER_TILE = 4.0
 """Side of a tile whose speckle counts as independent of the others'. [cells]"""
+TILES = (3, 8)
+"""Fewest and most tiles along each axis: fewer leave no freedom beside three unknowns, more add no
+precision to a covariance. [-]"""
 BESIDE = np.array([-12.0, -10.0, -8.0, -6.0, 6.0, 8.0, 10.0, 12.0])
 """Parallel planes that tell the local background. [cells]"""
 CONTRAST = 4.0
 """Smoothed intensity over the local background's that counts as wall: the mean over nine
 half-cell pixels, 2 to 3 independent ones, of pure background exceeds it once in a thousand; and
 a wall must hang together over many. [-]"""
+SMOOTHED = 3
+"""Half-cell pixels along either axis that are averaged before :data:`CONTRAST`. [-]"""
+FARTHEST = 2.5
+"""Distance to which a plane is followed, over that of its farthest known corner. [-]"""
+MOST_STEPS = 150
+"""Steps of the grid on which it is followed, on either side. [-]"""
 MOST_CORNERS = 8
+"""Corners of the polygon that is reported. [-]"""
 FEWEST_CELLS = 12.0
-"""Smallest area of a wall, and a third of it its least length. [cells]"""
+"""Smallest area of a wall: independent cells in which background alone passes :data:`CONTRAST`
+together with a probability of e⁻⁴⁸. [cells²]"""
+LEAST_LENGTH = FEWEST_CELLS / 4
+"""Least extent of a wall along either axis. [cells]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,10 +120,10 @@ def refine_plane(focus: Focus, wall: PlaneWall, resolution: Resolution) -> Plane
     -------
     The plane with its covariance; ``None`` if J has no summit nearby.
     """
-    for width in (1.5, *[SUMMIT] * ROUNDS):
+    for width in (FIRST_WIDTH, *[SUMMIT] * ROUNDS):
         cell = float(resolution.cell(wall.centre, wall.normal))
         places, points = points_on(wall, resolution)
-        if len(points) < 9:
+        if len(points) < FEWEST_POINTS:
             return None
         scale = np.array([*(1 / np.maximum(np.abs(places).max(axis=0), 1e-6)), 1.0]) * cell
         depths = width * cell * np.linspace(-1, 1, DEPTHS if width <= SUMMIT else 3 * DEPTHS)
@@ -154,7 +177,7 @@ def points_on(
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
     points = wall.centre + places @ wall.axes
     # Without the rim: the sidelobes of an end, which lean, would tilt the plane.
-    rim = min(CELLS_CUT * float(np.max(2 * step)), 0.2 * float((high - low).min()))
+    rim = min(CELLS_CUT * float(np.max(2 * step)), MOST_CUT * float((high - low).min()))
     inside = within(points, wall, margin=-rim)
     return places[inside], points[inside]
 
@@ -166,10 +189,9 @@ def _highest(
 ) -> Float[np.ndarray, " 3"]:
     """Return the best of a grid of changes (in units of a cell at the edges)."""
     step = depths[1] - depths[0]
-    units = np.linspace(-1.0, 1.0, 9)
     best = (-np.inf, np.zeros(3))
     rows = np.arange(len(magnitude))
-    for change in np.stack(np.meshgrid(units, units, units, indexing="ij"), -1).reshape(-1, 3):
+    for change in np.stack(np.meshgrid(GRID, GRID, GRID, indexing="ij"), -1).reshape(-1, 3):
         index = np.round((rise @ change - depths[0]) / step).astype(int)
         total = float(magnitude[rows, np.clip(index, 0, depths.size - 1)].sum())
         if total > best[0]:
@@ -188,7 +210,7 @@ def _sandwich(
     cells = [float(resolution.cell(wall.centre, axis)) for axis in wall.axes]
     index = np.zeros(len(places), dtype=np.int64)
     for column, size, cell in zip(places.T, sizes, cells, strict=True):
-        count = int(np.clip(size / (CELLS_PER_TILE * cell), 3, 8))
+        count = int(np.clip(size / (CELLS_PER_TILE * cell), *TILES))
         share = (column - column.min()) / max(size, 1e-9)
         index = count * index + np.minimum((share * count).astype(np.int64), count - 1)
     tiles = np.unique(index, return_inverse=True)[1]
@@ -229,8 +251,8 @@ def extent_of_plane(
     """
     cells = np.array([float(resolution.cell(wall.centre, axis)) for axis in wall.axes])
     across = float(resolution.cell(wall.centre, wall.normal))
-    farthest = min(reach[1], 2.5 * float(np.linalg.norm(wall.corners, axis=1).max()))
-    step = np.maximum(0.5 * cells, farthest / 150)
+    farthest = min(reach[1], FARTHEST * float(np.linalg.norm(wall.corners, axis=1).max()))
+    step = np.maximum(0.5 * cells, farthest / MOST_STEPS)
     lines = [np.arange(-int(farthest / s), int(farthest / s) + 1) * s for s in step]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
     points = wall.centre + places @ wall.axes
@@ -244,8 +266,8 @@ def extent_of_plane(
     focused = np.abs(focus(columns)) ** 2
     stacked = np.zeros((offsets.size, *shown.shape))
     stacked[:, shown] = focused.T
-    covered = scipy.ndimage.uniform_filter(shown.astype(float), size=3, mode="constant")
-    smooth = scipy.ndimage.uniform_filter(stacked, size=(1, 3, 3), mode="constant")
+    covered = scipy.ndimage.uniform_filter(shown.astype(float), size=SMOOTHED, mode="constant")
+    smooth = scipy.ndimage.uniform_filter(stacked, size=(1, SMOOTHED, SMOOTHED), mode="constant")
     smooth = smooth / np.maximum(covered, 1e-9)
     background = np.median(smooth[1:], axis=0)
     floor = max(DYNAMIC_RANGE * peak, float(np.median(background[shown])))
@@ -259,7 +281,7 @@ def extent_of_plane(
     corners = _polygon(places[seen], step)
     area = float(seen.sum() * np.prod(step) / np.prod(cells))
     lengths = np.ptp(corners, axis=0) / cells
-    if area < FEWEST_CELLS or lengths.min() < FEWEST_CELLS / 4:
+    if area < FEWEST_CELLS or lengths.min() < LEAST_LENGTH:
         return None
     centre = wall.centre + places[seen].mean(axis=0) @ wall.axes
     level = float(stacked[0][seen].mean())

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import survey_weights
@@ -20,6 +21,7 @@ from estimator.walls.line_detection import LineCandidate, find_lines
 from estimator.walls.line_extent import face_ends
 from estimator.walls.line_fit_image import fit_between, fit_line
 from estimator.walls.line_relations import (
+    BEYOND_END,
     hides,
     is_edge_on,
     is_hidden,
@@ -45,9 +47,14 @@ MOST_UNCERTAIN = 0.5
 scattered peaks. [cells]"""
 LEAST_CONTRAST = 10.0
 """Level of a wall over its surroundings: speckle in a cloud has some lines 5 dB above it. [-]"""
-LEAST_CONFIDENCE = 0.999
+LEAST_CONFIDENCE = 1 - false_alarm.WALL
+"""Confidence of a wall that is reported. [-]"""
+NEAREST = 0.5
+"""Distance down to which a wall is followed, over the nearest that the survey images: half the
+aperture away nothing is peaked, but a wall may go on there. [-]"""
 LEAST_CELLS = 8.0
-"""Shortest mirror; shorter ones have no angle to speak of. [cells]"""
+"""Shortest mirror: four cells are cut off for the ends' sidelobes
+(:data:`estimator.walls.line_sampling.CELLS_CUT`), and four are left to tell an angle. [cells]"""
 
 
 def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
@@ -87,7 +94,7 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
     behind = np.array(
         [
             any(hides(line, peak) for line in in_sight)
-            and not any(lies_on(peak, line, coarse, margin=4.0) for line in in_sight)
+            and not any(lies_on(peak, line, coarse, margin=BEYOND_END) for line in in_sight)
             for peak in looked.peaks
         ],
         dtype=bool,
@@ -132,7 +139,8 @@ def _fitted(
     doubtful: list[FittedLine] = []
     for candidate in candidates:
         ends = candidate.start, candidate.end
-        if any(all(lies_on(end, line, coarse, margin=4.0) for end in ends) for line in lines):
+        known = [[lies_on(end, line, coarse, margin=BEYOND_END) for end in ends] for line in lines]
+        if any(all(on) for on in known):
             continue  # a part of a wall that was followed to its ends already
         line = fit_line(
             plain,
@@ -140,7 +148,7 @@ def _fitted(
             candidate.start,
             candidate.end,
             resolution,
-            reach=(0.5 * reach[0], reach[1]),
+            reach=(NEAREST * reach[0], reach[1]),
             trials=trials,
         )
         if line is None or line.confidence < LEAST_CONFIDENCE:
@@ -233,7 +241,7 @@ def unassigned_peaks(
         [
             peak
             for peak in looked.peaks[~looked.bent]
-            if not any(lies_on(peak, line, resolution, margin=4.0) for line in lines)
+            if not any(lies_on(peak, line, resolution, margin=BEYOND_END) for line in lines)
             and not any(hides(line, peak) for line in lines)
         ]
     ).reshape(-1, 3)

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import ConvexHull
 
+from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_3d import PlaneWall, within
@@ -33,7 +34,8 @@ from estimator.walls.plane_fit import (
 from estimator.wavefronts.curvature_search_3d import search_wavefront
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
 
-LEAST_CONFIDENCE = 0.999
+LEAST_CONFIDENCE = 1 - false_alarm.WALL
+"""Confidence of a wall that is reported. [-]"""
 FLASHES = 6
 """Brightest peaks, beams apart, that are looked at for a flat wave."""
 FLAT = 0.25
@@ -47,7 +49,25 @@ makes flat waves of the speckle of a rough wall, but faint ones. [-]"""
 SKIRT = 2.5
 """Distance from a wall within which a peak belongs to it. [cells]"""
 DEVIATIONS = 6.0
-"""Deviations by which the curvature may miss 0, or must miss a point's."""
+"""Deviations by which the curvature may miss 0, or must miss a point's. The covariance is estimated
+from 25 tiles of the array, of which a few may hold most of the speckle. [-]"""
+BEAMS_APART = 3.0
+"""Distance of peaks that are looked at each for a flat wave of its own: a wall's own flash is as
+wide as the array, which near it is a few beams. [cells λ/2D]"""
+GATE_CELLS = 4.0
+"""Range beyond the array's extent that is kept for the fit of a flat wave. [cells c/2B]"""
+ROUNDEST = 1.5
+"""Largest curvature tried, over that of a point at the distance: what is rounder is no wall. [-]"""
+SAME_DIRECTION = 0.1
+"""Distance of two unit vectors, with lengths within half the array, below which two flat waves are
+one: 6°. Two walls as near to each other in both would cross before the array. [-]"""
+LOBE_CELLS = 1.5
+"""Distance from a wall's plane at which its grating lobe's origin may lie. [cells]"""
+MOST = 0.5
+"""Share of points, or of intensity, from which most of something is meant. [-]"""
+INNER = 0.7
+"""Where between its centre and its corners a polygon is sampled as well: half of its area is
+inside. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,23 +165,23 @@ def lobe_of_a_wall(
     on_wall = np.zeros(real.shape, dtype=bool)
     for wall in planes:
         beside = np.abs((flat - wall.centre) @ wall.normal)
-        near = beside < 1.5 * resolution.cell(flat, wall.normal)
+        near = beside < LOBE_CELLS * resolution.cell(flat, wall.normal)
         on_wall |= near.reshape(real.shape) & real
     explained = on_wall.any(axis=1)
     weights = intensity[strongest]
-    return bool(weights[explained].sum() > 0.5 * weights.sum() > 0)
+    return bool(weights[explained].sum() > MOST * weights.sum() > 0)
 
 
 def flat_waves(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> tuple[Wavefront, ...]:
     """Find the waves that walls met head-on return, at the brightest peaks of the survey."""
     found: list[Wavefront] = []
     fine = planar_resolution(array, echo)
-    for peak in _apart(looked.peaks, 3 * fine.across_ray)[:FLASHES]:
+    for peak in _apart(looked.peaks, BEAMS_APART * fine.across_ray)[:FLASHES]:
         distance = float(np.linalg.norm(peak))
-        near = gated(echo, distance, reach=2 * array.half + 4 * fine.along_ray)
+        near = gated(echo, distance, reach=2 * array.half + GATE_CELLS * fine.along_ray)
         cosines = (float(peak[0]) / distance, float(peak[2]) / distance)
         start = search_wavefront(
-            near, cosines=cosines, path_length=distance, roundest=1.5 / distance
+            near, cosines=cosines, path_length=distance, roundest=ROUNDEST / distance
         )
         try:
             wave = fit_wavefront(
@@ -238,7 +258,8 @@ def _apart(peaks: Float[np.ndarray, "peaks 3"], angle: float) -> Float[np.ndarra
 
 def _alike(wave: Wavefront, other: Wavefront, array: PlanarArray) -> bool:
     apart = np.linalg.norm(wave.direction - other.direction)
-    return bool(abs(wave.path_length - other.path_length) < array.half and apart < 0.1)
+    near = abs(wave.path_length - other.path_length) < array.half
+    return bool(near and apart < SAME_DIRECTION)
 
 
 def _around(
@@ -256,9 +277,9 @@ def _around(
 
 def _same(wall: PlaneWall, other: PlaneWall, resolution: Resolution) -> bool:
     """Tell whether most of a wall lies on another, which was followed to its ends."""
-    inner = wall.centre + 0.7 * (wall.corners - wall.centre)
+    inner = wall.centre + INNER * (wall.corners - wall.centre)
     points = np.concatenate([wall.centre[None], wall.corners, inner])
-    return bool(_onto(points, other, resolution).mean() > 0.5)
+    return bool(_onto(points, other, resolution).mean() > MOST)
 
 
 def _explained(

@@ -15,10 +15,23 @@ from estimator.measurement.model import Uplink
 PHASE_STEP = 1.0
 """Difference of phase at the aperture's ends between neighbouring radii. [rad]"""
 SAMPLES_PER_CELL = 8
+"""Samples of a length for each range cell c/B: between them a peak loses 0.06 dB at most. [-]"""
 HALF_BEAMS = 6
-"""Angles looked at on either side, in half beam widths."""
+"""Angles looked at on either side, in half beam widths λ/D: an unmodelled curvature moves the
+map's peak by a few beams. [-]"""
 HALF_CELLS = 4
-"""Lengths looked at on either side, in range cells c/B."""
+"""Lengths looked at on either side, in range cells c/B, for the same reason. [-]"""
+GATE_CELLS = 2
+"""Range cells of the profiles beyond all of these. [-]"""
+ROUNDEST = 0.5
+"""Largest curvature tried, times half the aperture: a source at the distance of the aperture. [-]
+"""
+FINEST = 0.01
+"""Least step of the curvature, times half the aperture, for waves along the axis, whose curvature
+hardly shows. [-]"""
+LEAST_BEND = 1e-3
+"""Curvature of a plane wave, as it is handed on: a radius of a kilometre is flat to 1e-3 of a
+wavelength over half a metre at 300 GHz. [1/m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +64,7 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
     cell = speed_of_light / float(np.ptp(uplink.frequencies))
     # Sagitta of the transverse half aperture: k h² sin²θ / 2R.
     sagitta = 0.5 * centre * (half * np.sin(aoa)) ** 2
-    bends = np.arange(0.0, 0.5 / half, max(PHASE_STEP / max(sagitta, 1e-9), 0.01 / half))
+    bends = np.arange(0.0, ROUNDEST / half, max(PHASE_STEP / max(sagitta, 1e-9), FINEST / half))
     bends = np.append(bends, 1 / path_length)
     beam = np.pi / (centre * half)
     cosines = np.cos(aoa) + 0.5 * beam * np.arange(-HALF_BEAMS, HALF_BEAMS + 1)
@@ -59,7 +72,8 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
 
     step = cell / SAMPLES_PER_CELL
     reach = HALF_CELLS * cell
-    profiles, first = _gated_profiles(uplink, path_length, half + reach + 2 * cell, step)
+    gate = half + reach + GATE_CELLS * cell
+    profiles, first = _gated_profiles(uplink, path_length, gate, step)
     shifts = np.arange(-HALF_CELLS * SAMPLES_PER_CELL, HALF_CELLS * SAMPLES_PER_CELL + 1)
     best = (-1.0, 0, 0, 0)
     for i, bend in enumerate(bends):
@@ -67,7 +81,7 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
         excess = _excess(across, cosines, float(bend))
         places = (path_length + excess - first) / step
         cells = np.round(places).astype(int)
-        # Within a cell only the carrier's phase turns; an eighth of a cell is 0.3 dB at most.
+        # Within a sample only the carrier's phase turns.
         turned = np.exp(1j * centre * (path_length + excess))
         gathered = profiles[np.arange(len(across))[None, :, None], cells[:, :, None] + shifts]
         sums = np.abs(np.einsum("cm,cms->cs", turned, gathered))
@@ -78,7 +92,7 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
     return Start(
         aoa=float(np.arccos(cosines[j])),
         path_length=path_length + float(shifts[k]) * step,
-        radius=float(1 / max(bends[i], 1e-3)),
+        radius=float(1 / max(bends[i], LEAST_BEND)),
     )
 
 

@@ -18,10 +18,21 @@ from estimator.measurement.model import Echo, Uplink
 PHASE_STEP = 1.0
 """Difference of phase at the aperture's corners between neighbouring curvatures. [rad]"""
 SAMPLES_PER_CELL = 6
+"""Samples of a length for each range cell: between them a peak loses 0.1 dB at most. [-]"""
+STRIDE = 2
+"""Samples from one length looked at to the next: a third of a cell, 0.4 dB at most. [-]"""
 HALF_BEAMS = 4
-"""Directions looked at on either side and axis, in half beam widths."""
+"""Directions looked at on either side and axis, in half beam widths. [-]"""
 HALF_CELLS = 2
-"""Lengths looked at on either side, in range cells."""
+"""Lengths looked at on either side, in range cells. [-]"""
+ROUNDEST = 0.5
+"""Largest curvature tried, times half the aperture's diagonal: a source at its distance. [-]"""
+MOST_ROUND = 4.0
+"""The same over the curvature of a source at the peak: a patch that scatters a path stands between
+the array and a quarter of the path's length. [-]"""
+WIDEST = 0.98
+"""Largest sum of squared cosines that is tried: within 8° of the array's plane its elements see no
+wave. [-]"""
 MOST_ELEMENTS = 400
 """Elements used; of more, evenly chosen ones: a start needs no full gain."""
 
@@ -64,7 +75,7 @@ def search_wavefront(
     extent = np.ptp(measured.positions, axis=0)
     half = 0.5 * float(np.linalg.norm(extent))
     cell = 2 * np.pi / float(np.ptp(wavenumbers))
-    most = min(0.5 / half, 4 / path_length) if roundest is None else roundest
+    most = min(ROUNDEST / half, MOST_ROUND / path_length) if roundest is None else roundest
     count = max(2, int(np.ceil((most - flattest) * 0.5 * centre * half**2 / PHASE_STEP)) + 1)
     bends = np.append(np.linspace(flattest, most, count), 1 / path_length)
     bends = bends[(bends >= flattest) & (bends <= most + 1e-12)]
@@ -73,12 +84,12 @@ def search_wavefront(
     along = cosines[0] + 2 * np.pi / (centre * extent[0]) * steps
     up = cosines[1] + 2 * np.pi / (centre * extent[2]) * steps
     grid = np.stack(np.meshgrid(along, up, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = grid[(grid**2).sum(axis=1) < 0.98]
+    grid = grid[(grid**2).sum(axis=1) < WIDEST]
 
     step = cell / SAMPLES_PER_CELL
     reach = HALF_CELLS * cell
     profiles, first = _gated_profiles(samples, wavenumbers, path_length, half + reach + cell, step)
-    shifts = np.arange(-HALF_CELLS * SAMPLES_PER_CELL, HALF_CELLS * SAMPLES_PER_CELL + 1, 2)
+    shifts = np.arange(-HALF_CELLS * SAMPLES_PER_CELL, HALF_CELLS * SAMPLES_PER_CELL + 1, STRIDE)
     best = (-1.0, 0, 0, 0)
     for i, bend in enumerate(bends):
         excess = _excess(positions, grid, float(bend))

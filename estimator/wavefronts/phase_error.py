@@ -20,6 +20,8 @@ from jaxtyping import Complex, Float
 from scipy.fft import dct
 from scipy.stats import chi2, f
 
+from estimator import false_alarm
+
 TILTS = (3, 8)
 """Modes over the aperture, in half periods, that tell the level of a tilt. Lower ones belong to
 the wave itself (gain, angle, curvature) and to the antenna's beam; far higher ones come from
@@ -33,9 +35,9 @@ four walls (20 to 40 cm, 0.01 to 0.1 mm rms, 30 and 75 GHz): 0.6 to 1.0, and 0.2
 where the wall is longest, as its far patches come too late to touch the first mode."""
 
 MANY = 40
-"""Last mode that tells whether there is anything beside noise at all."""
-SIGNIFICANT = 0.99
-"""Probability that modes of noise alone stay below what counts as more."""
+"""Last mode that tells whether there is anything beside noise at all. [half periods]"""
+COVERED = 0.95
+"""Probability of the region that stays one when a variance is known from few modes only. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +53,11 @@ def wavefront_error(
     wave: Complex[np.ndarray, "elements freqs"],
     noise: float,
 ) -> WavefrontError:
-    """Estimate the error of a fitted wave's phase from what the fit leaves over.
+    """Estimate the error of a fitted wave's phase from the residual of the fit.
 
     Parameters
     ----------
-    left
+    residual
         The pilot less all fitted waves. [-]
     wave
         One of these, as it was fitted. [-]
@@ -64,7 +66,7 @@ def wavefront_error(
 
     Returns
     -------
-    Its variances; 0 where noise alone explains what is left.
+    Its variances; 0 where noise alone explains the residual.
     """
     count = wave.shape[1]
     size = np.abs(wave)
@@ -72,8 +74,8 @@ def wavefront_error(
     turned = residual * np.conj(wave) / (np.maximum(size, 1e-12 * level) * level)
     falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     bands = np.stack([turned.mean(axis=1), (turned * falling).mean(axis=1)])
-    # Antennas' gain and the wave's spreading vary over the band by a factor that all elements
-    # share: it is no bend of the wavefront, though the wave itself is stronger on near ones.
+    # Antennas' gain and the wave's spreading vary over the band by a factor common to all
+    # elements: it is no curvature of the wavefront, though near elements receive more.
     shape = size[:, 0] / np.linalg.norm(size[:, 0])
     bands = bands - np.outer(bands @ shape, shape)
     modes = np.abs(dct(bands.real, norm="ortho", axis=1)) ** 2
@@ -87,21 +89,23 @@ def wavefront_error(
 
 
 def _excess(modes: Float[np.ndarray, " elements"], first: int, last: int, white: float) -> float:
-    """Return the level of some modes over that of noise.
+    """Return the mean level of modes ``first`` to ``last``, less that of noise.
 
-    Where the few do not stand out of noise, many tell better that there is nothing, or little.
+    Where these are not significant (:data:`estimator.false_alarm.EXCESS`), the mean of modes up to
+    :data:`MANY` is used, which knows the level of a weak error better.
     """
     first = min(first, modes.size - 1)
     few = modes[first : last + 1]
-    if few.mean() > white * chi2.ppf(SIGNIFICANT, 2 * few.size) / (2 * few.size):
+    if few.mean() > white * chi2.ppf(1 - false_alarm.EXCESS, 2 * few.size) / (2 * few.size):
         return _widening((first, last)) * (float(few.mean()) - white)
     return max(float(modes[first : MANY + 1].mean()) - white, 0.0)
 
 
 def _widening(modes: tuple[int, int]) -> float:
-    """Widen a variance known from few modes, so that a 95 % region in two dimensions is one.
+    """Return a factor on a variance known from few modes, for a true 95 % region in the plane.
 
-    Its square is F-distributed then, with two degrees of freedom for each mode, not χ².
+    The square of an error over such a variance is F-distributed, with two degrees of freedom for
+    each mode, not χ².
     """
     freedom = 2 * (modes[1] - modes[0] + 1)
-    return float(2 * f.ppf(0.95, 2, freedom) / chi2.ppf(0.95, 2))
+    return float(2 * f.ppf(COVERED, 2, freedom) / chi2.ppf(COVERED, 2))

@@ -27,8 +27,24 @@ from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.phase_error import wavefront_error
 
 ITERATIONS = 40
+"""Most Gauss-Newton steps; five suffice from a summit's own main lobe. [-]"""
 CONVERGED = 1e-2
-"""Step at which the iteration ends, in standard deviations of the parameters. [-]."""
+"""Step at which the iteration ends, in standard deviations of the parameters. [-]"""
+FLOOR = 1e-7
+"""Noise that is assumed at least, over the pilot's rms, so that a noise-free pilot converges too:
+the rounding of float64 after sums over 1e5 samples. [-]"""
+LONGEST_STEP = 0.5
+"""Largest step, in main lobes: the model is linear over less. [-]"""
+LONGEST_RADIUS_STEP = 0.3
+"""Largest step of a radius of curvature, over the radius. [-]"""
+FARTHEST = 2.0
+"""Distance from its start, in main lobes, beyond which a fit has left its peak. [-]"""
+NARROWEST_BAND = 1e-3
+"""Bandwidth over the highest frequency that the length's main lobe is taken of at least: of one
+frequency alone it would be endless. [-]"""
+MOST_CONDITION = 1e12
+"""Condition number of JᵀJ, its columns scaled, from which two waves are the same: float64 keeps
+four digits of its inverse. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +89,7 @@ def wave_field(
     """Evaluate the model's field at unit gain, for elements in the array's frame. [-]."""
     source = radius * np.array([np.cos(aoa), np.sin(aoa), 0.0])
     distances = np.linalg.norm(source - positions, axis=-1)
-    # r − R_c without cancellation: a plane wave has a radius beyond all measure.
+    # r − R_c without cancellation, also for the huge radius of a plane wave.
     excess = ((positions**2).sum(axis=-1) - 2 * positions @ source) / (distances + radius)
     field: np.ndarray = (radius / distances)[:, None] * _delayed(excess + path_length, frequencies)
     return field
@@ -142,17 +158,18 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
         limit = max(
             _overshoot(step, values, lobe) for step, values in zip(steps, parameters, strict=True)
         )
-        # Far from the peak the linear model overshoots: never move by more than half a lobe.
+        # Far from the peak the linear model overshoots.
         moves = [step[2:] / max(1.0, limit) for step in steps]
         parameters = [values + move for values, move in zip(parameters, moves, strict=True)]
         for values, origin, start in zip(parameters, first, starts, strict=True):
-            if np.any(np.abs(values[:2] - origin[:2]) > 2 * lobe) or np.any(values <= 0):
+            far = np.abs(values[:2] - origin[:2]) > FARTHEST * lobe
+            if np.any(far) or np.any(values <= 0):
                 raise ValueError(
                     f"no peak within two main lobes of {np.degrees(start.aoa):.3f}°, "
                     f"{start.path_length:.4f} m"
                 )
         noise = np.sqrt(np.mean(np.abs(state.residual) ** 2) / 2)
-        floor = 1e-7 * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
+        floor = FLOOR * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
         deviations = np.split(np.sqrt(np.diag(bread)), state.bounds)
         done = all(
             np.all(np.abs(move) < CONVERGED * deviation[2:] * max(noise, floor))
@@ -182,7 +199,7 @@ def _main_lobe(uplink: Uplink, wavenumbers: Float[np.ndarray, " freqs"]) -> Floa
     return np.array(
         [
             2 * np.pi / (wavenumbers[-1] * aperture),
-            2 * np.pi / max(np.ptp(wavenumbers), wavenumbers[-1] * 1e-3),
+            2 * np.pi / max(np.ptp(wavenumbers), wavenumbers[-1] * NARROWEST_BAND),
         ]
     )
 
@@ -193,8 +210,10 @@ def _overshoot(
     lobe: Float[np.ndarray, " 2"],
 ) -> float:
     """Return by how much a step is too long."""
-    limit = float(np.max(np.abs(step[2:4]) / (0.5 * lobe), initial=0.0))
-    return max(limit, abs(step[4]) / (0.3 * values[2])) if len(values) == 3 else limit
+    limit = float(np.max(np.abs(step[2:4]) / (LONGEST_STEP * lobe), initial=0.0))
+    if len(values) < 3:
+        return limit
+    return max(limit, float(abs(step[4]) / (LONGEST_RADIUS_STEP * values[2])))
 
 
 def _linearised(
@@ -296,7 +315,7 @@ def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) 
     """Invert JᵀJ, with its columns scaled to equal length."""
     scale = 1 / np.sqrt(np.diag(normal))
     scaled = normal * np.outer(scale, scale)
-    if len(starts) > 1 and np.linalg.cond(scaled) > 1e12:
+    if len(starts) > 1 and np.linalg.cond(scaled) > MOST_CONDITION:
         raise ValueError("two waves became one")
     inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
     return inverse

@@ -25,8 +25,18 @@ from scipy.constants import speed_of_light
 from estimator.measurement.model import Echo, Uplink
 
 ITERATIONS = 15
+"""Most Gauss-Newton steps. [-]"""
 CONVERGED = 1e-2
-"""Step at which the iteration ends, in standard deviations of the parameters. [-]."""
+"""Step at which the iteration ends, in standard deviations of the parameters. [-]"""
+LONGEST_STEP = 0.5
+"""Largest step, in main lobes: the model is linear over less. [-]"""
+FARTHEST = 2.0
+"""Distance from its start, in main lobes, beyond which a fit has left its peak. [-]"""
+NARROWEST_BAND = 1e-3
+"""Bandwidth over the highest frequency that the length's main lobe is taken of at least. [-]"""
+CURVATURES = (-0.5, 0.9)
+"""Curvatures, times half the aperture's diagonal, between which a fit stays: at 1 the source would
+be at the array's corner. [-]"""
 
 TILES = 5
 """Tiles of the array along each axis; residuals of different tiles count as independent."""
@@ -104,7 +114,7 @@ def fit_wavefront(
         [
             2 * np.pi / (wavenumbers[-1] * extent[0]),
             2 * np.pi / (wavenumbers[-1] * extent[2]),
-            2 * np.pi / max(np.ptp(wavenumbers), 1e-3 * wavenumbers[-1]),
+            2 * np.pi / max(np.ptp(wavenumbers), NARROWEST_BAND * wavenumbers[-1]),
             2 * np.pi / (wavenumbers[-1] * 0.5 * half**2),
         ]
     )[: parameters.size]
@@ -112,13 +122,13 @@ def fit_wavefront(
     for _ in range(ITERATIONS):
         normal, scores, _, explained = _linearised(measured, wavenumbers, parameters, passes)
         step = np.linalg.solve(normal, scores.sum(axis=0))[2:]
-        # Far from the summit the linear model overshoots: never move by more than half a lobe.
-        step = step / max(1.0, float(np.max(np.abs(step) / (0.5 * lobe))))
+        # Far from the summit the linear model overshoots.
+        step = step / max(1.0, float(np.max(np.abs(step) / (LONGEST_STEP * lobe))))
         parameters = parameters + step
-        gone = np.abs(parameters[:3] - start[:3]) > 2 * lobe[:3]
+        gone = np.abs(parameters[:3] - start[:3]) > FARTHEST * lobe[:3]
         if np.any(gone) or parameters[0] ** 2 + parameters[1] ** 2 >= 1 or parameters[2] <= 0:
             raise ValueError(f"no summit within two main lobes of {start[:3]}")
-        if free and not -0.5 / half < parameters[3] < 0.9 / half:
+        if free and not CURVATURES[0] / half < parameters[3] < CURVATURES[1] / half:
             raise ValueError(f"the curvature runs off to {parameters[3]:.3g}/m")
         deviation = np.sqrt(np.diag(np.linalg.inv(normal))[2:])
         noise = np.sqrt(energy * max(1 - explained, 1e-12) / measured.samples.size)
