@@ -16,32 +16,29 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from estimator.measurement.store import measurement_to_dataset
-from mmslam.moving_users import track_store
-from scenes.files.loading import load_scenario
+import mmslam
 from scenes.scenario import parse_scenario
-from simulator.simulation import simulate
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 STEP = 0.05  # [s]
 SILENT = 3  # the time without a pilot
 places = np.stack([np.linspace(0.40, 0.60, 7), np.linspace(0.36, 0.44, 7)], axis=1)  # [m]
 
-scenario = load_scenario(
+scenario = mmslam.load_scenario(
     "slam_2d",
-    [
-        "base_station.elements=96",
-        "radio.points=401",
-        "objects.wall.centre_m=[0.0, 0.4]",
-        "objects.wall.length_m=0.25",
-    ],
+    {
+        "base_station.elements": 96,
+        "radio.points": 401,
+        "objects.wall.centre_m": [0.0, 0.4],
+        "objects.wall.length_m": 0.25,
+    },
 )
 tables = scenario.model_dump(mode="json", exclude_none=True)
 antenna = tables["users"].pop("user")["antenna"]
 for index, place in enumerate(places):
     if index != SILENT:
         tables["users"][f"{index}"] = {"position_m": place.tolist(), "antenna": antenna}
-measurement = simulate(parse_scenario(tables), seed=0).measurement
+measurement = mmslam.simulate(parse_scenario(tables), seed=0)
 
 # One sample for each time: the echo of the room, and the pilot of that time, of user "ann".
 rng = np.random.default_rng(0)
@@ -53,16 +50,14 @@ for index in range(len(places)):
         f"{index}", replace(measurement.uplinks[0], samples=quiet[0] + 1j * quiet[1])
     )
     samples.append(
-        measurement_to_dataset(
-            replace(measurement, uplinks=(replace(pilot, user="ann"),), clock_offset=0.0)
-        )
+        replace(measurement, uplinks=(replace(pilot, user="ann"),), clock_offset=0.0).to_xarray()
     )
 dataset = xr.concat(samples, "sample", data_vars=["echo", "uplink"], join="exact")
 times = STEP * np.arange(len(places))
 dataset["time"] = ("sample", times, {"units": "s"})
 dataset.to_zarr(folder / "track.zarr", mode="w", zarr_format=3, consolidated=False)
 
-(ann,) = track_store(folder / "track.zarr")
+(ann,) = mmslam.track(folder / "track.zarr")
 for time, answer in zip(ann.times, ann.answers, strict=True):
     print(f"{time:.2f} s: {answer.status}" + (f" ({answer.reason})" if answer.reason else ""))
 for point in ann.track.points:

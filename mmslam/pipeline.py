@@ -1,4 +1,4 @@
-"""Joins the packages: scenario, measurement, estimate, comparison, figures, report."""
+"""From a scenario to a measurement, from a measurement to an answer, and to a folder of results."""
 
 import time
 from collections.abc import Mapping
@@ -6,15 +6,102 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimator.localization.pipeline import locate
-from estimator.measurement.model import Measurement
-from estimator.measurement.store import read_measurement, write_measurement
-from estimator.results.estimate import Estimate, Progress
+from estimator import localization
+from estimator.measurement import model
+from estimator.results.estimate import Progress
 from mmslam import output
-from mmslam.measurement_files import simulate_interruptibly
+from mmslam.measurement import Measurement
+from mmslam.measurement_files import read, write
 from mmslam.results.document import result_document, to_json
+from mmslam.results.estimate import Estimate
+from mmslam.terminal.interruption import interruptions_held
 from scenes.scenario import Scenario, ScenarioError
-from validation.metrics.truth import Truth, read_truth, truth_from_dataset
+
+
+def simulate(scenario: Scenario, *, seed: int = 0, progress: Progress | None = None) -> Measurement:
+    """Simulate the measurement of a scenario, with the truth beside it.
+
+    Ctrl-C takes effect between two steps.
+
+    Parameters
+    ----------
+    scenario
+        What :func:`mmslam.load_scenario` returns.
+    seed
+        Of roughness and noise: the same seed gives the same samples.
+    progress
+        Told each stage's steps.
+
+    Raises
+    ------
+    ScenarioError
+        If nothing at all is received.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> small = {"base_station.elements": 16, "radio.points": 16}
+    >>> measurement = mmslam.simulate(mmslam.load_scenario("point_scatterers", small), seed=1)
+    >>> measurement.echo.samples.shape
+    (16, 16)
+    >>> measurement.truth.target_position["near"]
+    array([0. , 0.5, 0. ])
+    """
+    with interruptions_held() as let_through:
+        from simulator import simulation  # Sionna's import takes seconds
+
+        def step(stage: str, done: int, total: int) -> None:
+            let_through()
+            if progress is not None:
+                progress(stage, done, total)
+
+        found = simulation.simulate(scenario, seed=seed, progress=step)
+    return Measurement.of(found.measurement, beside=found.truth)
+
+
+def locate(measurement: model.Measurement, *, progress: Progress | None = None) -> Estimate:
+    """Find walls, targets and users from a measurement alone.
+
+    Parameters
+    ----------
+    measurement
+        Of a linear or a planar array; echo or uplinks may be missing. A truth beside it is taken
+        off first: the estimator is not given it.
+    progress
+        Told each stage.
+
+    Returns
+    -------
+    What was found, in the world frame. That nothing was found is an answer, too.
+
+    Raises
+    ------
+    MeasurementError
+        If the array is neither linear nor planar, or the frequencies are not uniform.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> small = {
+    ...     "base_station.elements": 32, "radio.points": 51, "users.user.position_m": [0.1, 0.3]
+    ... }
+    >>> measurement = mmslam.simulate(mmslam.load_scenario("los_user", small), seed=1)
+    >>> estimate = mmslam.locate(measurement)
+    >>> estimate.users["user"].status
+    'found'
+    """
+    seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
+    return Estimate.of(localization.locate(seen, progress=progress), seen)
+
+
+def simulate_to_file(
+    scenario: Scenario, *, seed: int, path: Path, progress: Progress | None = None
+) -> Measurement:
+    """Simulate a scenario to a measurement file; ``path`` is refused before any work."""
+    with output.replacing(path, output.refuse_foreign_store) as new:
+        measurement = simulate(scenario, seed=seed, progress=progress)
+        write(new, measurement)
+    return measurement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,14 +137,13 @@ def run_scenario(
     with output.replacing(folder, output.refuse_foreign_results) as new:
         new.mkdir()
         started = time.perf_counter()
-        measurement, true_scene = simulate_interruptibly(scenario, seed=seed, progress=progress)
+        measurement = simulate(scenario, seed=seed, progress=progress)
         timings = {"simulate": time.perf_counter() - started}
         started = time.perf_counter()
-        write_measurement(new / output.MEASUREMENT, measurement, truth=true_scene)
+        write(new / output.MEASUREMENT, measurement)
         timings["write_measurement"] = time.perf_counter() - started
-        truth = truth_from_dataset(true_scene)
         estimate = locate(measurement, progress=progress)
-        result = _write_results(new, measurement, estimate, truth, timings, scenario)
+        result = _write_results(new, measurement, estimate, timings, scenario)
     return Outcome(folder=folder, result=result)
 
 
@@ -98,14 +184,13 @@ def locate_measurement(
     progress
         Told each stage's steps.
     """
-    measurement = read_measurement(path, sample=sample)
+    measurement = read(path, sample=sample)
     folder = folder or default_folder(measurement, path, sample)
     output.refuse_to_replace_input(folder, path)
     with output.replacing(folder, output.refuse_foreign_results) as new:
         new.mkdir()
         estimate = locate(measurement, progress=progress)
-        truth = read_truth(path, sample=sample)
-        result = _write_results(new, measurement, estimate, truth, {}, None)
+        result = _write_results(new, measurement, estimate, {}, None)
     return Outcome(folder=folder, result=result)
 
 
@@ -123,7 +208,6 @@ def _write_results(
     new: Path,
     measurement: Measurement,
     estimate: Estimate,
-    truth: Truth,
     timings: dict[str, float],
     scenario: Scenario | None,
 ) -> Mapping[str, Any]:
@@ -131,6 +215,7 @@ def _write_results(
     from mmslam.results.pictures_2d import write_pictures
     from mmslam.results.report import render_report
 
+    truth = measurement.truth  # opened now, after the estimate
     started = time.perf_counter()
     pictures = write_pictures(new, measurement, estimate, truth)
     timings = {**timings, "figures": time.perf_counter() - started}

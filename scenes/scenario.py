@@ -95,7 +95,15 @@ class Noise(Checked):
 
 
 class Scenario(Checked):
-    """A whole scene: radio, base station, objects, users and noise. The truth."""
+    """A whole scene: radio, base station, objects, users and noise. The truth.
+
+    Examples
+    --------
+    >>> from scenes import load_scenario
+    >>> room = load_scenario("slam_2d")
+    >>> room.dimensions, list(room.objects), room.radio.points
+    (2, ['wall'], 1001)
+    """
 
     format: Literal[1] = Field(1, description="the format of this file: 1")
     name: Name = Field(description="the scenario's name")

@@ -66,10 +66,7 @@ def test_every_public_name_is_there(stub: Path) -> None:
 def test_a_stub_lists_what_it_imports(stub: Path) -> None:
     tree = ast.parse((CHECKOUT / stub).read_text(encoding="utf-8"))
     imported = [
-        alias.name
-        for node in tree.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
+        alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
     ]
     package = importlib.import_module(name_of(stub.parent))
     (listed,) = (node.value for node in tree.body if isinstance(node, ast.Assign))

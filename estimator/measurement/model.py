@@ -25,7 +25,18 @@ class MeasurementError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Echo:
-    """Stepped-frequency echo of the scene: monostatic, or from transmitters that stand apart."""
+    """Stepped-frequency echo of the scene: monostatic, or from transmitters that stand apart.
+
+    Examples
+    --------
+    >>> positions = np.array([[0.0, 0.0, 0.0], [5e-4, 0.0, 0.0]])  # [m]
+    >>> frequencies = np.array([220e9, 221e9, 222e9])  # [Hz]
+    >>> echo = Echo(
+    ...     samples=np.full((2, 3), 1e-3 + 0j), positions=positions, frequencies=frequencies
+    ... )
+    >>> echo.samples.shape
+    (2, 3)
+    """
 
     samples: Complex[np.ndarray, "positions freqs"]  # S-parameter [-]
     positions: Float[np.ndarray, "positions 3"]  # phase centres, of the receiver [m]
@@ -39,7 +50,16 @@ class Echo:
 
 @dataclass(frozen=True, kw_only=True)
 class Uplink:
-    """One user's pilot, as each element of the array receives it."""
+    """One user's pilot, as each element of the array receives it.
+
+    Examples
+    --------
+    >>> positions = np.array([[0.0, 0.0, 0.0], [5e-4, 0.0, 0.0]])  # [m]
+    >>> frequencies = np.array([220e9, 221e9, 222e9])  # [Hz]
+    >>> samples = np.full((2, 3), 1e-3 + 0j)
+    >>> Uplink(samples=samples, positions=positions, frequencies=frequencies, user="ann").user
+    'ann'
+    """
 
     samples: Complex[np.ndarray, "elements freqs"]  # S-parameter [-]
     positions: Float[np.ndarray, "elements 3"]  # phase centres [m]

@@ -134,3 +134,4 @@ class Estimate:
     direction_maps: tuple[DirectionMap, ...] = ()  # one for each user of a planar array
     notes: tuple[str, ...] = ()  # what was assumed or could not be done
     timings: dict[str, float] = field(default_factory=dict)  # stage → duration [s]
+    aperture: Float[np.ndarray, "positions 3"] | None = None  # that it was made from [m]

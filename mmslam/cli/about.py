@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+import mmslam
 from mmslam.cli.options import AsJson, OutFolder
 from mmslam.cli.printing import print_json
 from mmslam.terminal.exit_codes import BAD_INPUT, FALLS_SHORT, stdout_kept_clean, told_clearly
@@ -87,30 +88,20 @@ def design(
 ) -> None:
     """Print resolutions, unambiguous ranges, needed steps and field regions of a radio."""
     with told_clearly():
-        from mmslam.commands.design import (
-            design_document,
-            design_lines,
-            design_rows,
-            scenario_radio,
+        found = mmslam.design(
+            scenario,
+            start_ghz=start_ghz,
+            stop_ghz=stop_ghz,
+            points=points,
+            elements=elements,
+            spacing_mm=spacing_mm,
+            distance_m=distance_m,
+            angle_deg=angle_deg,
         )
-        from scenes.files.loading import load_scenario
-
-        given = {
-            "start_ghz": start_ghz,
-            "stop_ghz": stop_ghz,
-            "points": points,
-            "elements": elements,
-            "spacing_mm": spacing_mm,
-        }
-        options = scenario_radio(load_scenario(scenario))
-        options |= {key: value for key, value in given.items() if value is not None}
-        options |= {"distance_m": distance_m, "angle_deg": angle_deg}
-        rows = design_rows(**options)
         if as_json:
-            print_json(design_document(options, rows))
-            return
-        for line in design_lines(rows):
-            typer.echo(line)
+            print_json(found.to_dict())
+        else:
+            typer.echo(repr(found))
 
 
 def info(as_json: AsJson = False) -> None:

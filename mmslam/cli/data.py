@@ -61,26 +61,12 @@ def import_(
     `user_position` and `wall_profile`.
     """
     with told_clearly():
-        from mmslam import measurement_files
+        from mmslam.measurement_files import import_to_file
 
-        mapping = mapping or measurement_files.mapping_beside(source)
-        if mapping is None:
-            if source.is_dir() or (source.exists() and source.suffix.lower() != ".npz"):
-                raise typer.BadParameter(
-                    f"{source}: measured data needs --mapping FILE.toml; its keys are listed by "
-                    "`mmslam import --schema`"
-                )
-            measurement = measurement_files.import_to_file(source, uplink=uplink, path=output)
-        else:
-            if uplink is not None:
-                raise typer.BadParameter("--uplink is for data without a mapping; leave it out")
-            with stdout_kept_clean():
-                imported = measurement_files.import_measured_to_file(
-                    source, mapping=mapping, path=output
-                )
-            measurement = imported.measurement
-            for note in imported.notes:
-                typer.echo(f"mmslam: note: {note}", err=True)
+        with stdout_kept_clean():
+            measurement = import_to_file(source, mapping=mapping, uplink=uplink, path=output)
+        for note in measurement.notes:
+            typer.echo(f"mmslam: note: {note}", err=True)
         print_written(output, measurement, as_json)
 
 

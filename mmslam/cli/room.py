@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+import mmslam
 from mmslam.cli.options import AsJson, OutFile, OutFolder, Overrides, ScenarioName, Seed
 from mmslam.cli.printing import print_json, print_outcome, print_written
 from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
@@ -41,7 +42,7 @@ def scenes(
     """List the built-in scenarios, or look at, draw or export one."""
     with told_clearly():
         from mmslam.commands import scenarios as commands
-        from scenes.files.loading import load_scenario, scenario_schema
+        from scenes.files.loading import scenario_schema
 
         if schema:
             print_json(scenario_schema())
@@ -50,7 +51,7 @@ def scenes(
                 raise typer.BadParameter("--show and --set need the NAME of a scenario")
             commands.list_scenarios(export=export, as_json=as_json)
         else:
-            scenario = load_scenario(name, overrides or [])
+            scenario = mmslam.load_scenario(name, overrides or [])
             commands.show_scenario(
                 scenario,
                 picture=_picture(show, out, scenario.name),
@@ -74,9 +75,8 @@ def run(
     """
     with told_clearly():
         from mmslam.terminal.stage_progress import StageProgress
-        from scenes.files.loading import load_scenario
 
-        loaded = load_scenario(scenario, overrides or [])
+        loaded = mmslam.load_scenario(scenario, overrides or [])
         folder = out or Path("out") / f"{loaded.name}-{seed}"
         with stdout_kept_clean(), StageProgress() as progress:
             from mmslam.pipeline import run_scenario
@@ -95,11 +95,10 @@ def simulate(
     """Simulate the measurement of a scenario, and write it with its truth to one file."""
     with told_clearly():
         from mmslam.terminal.stage_progress import StageProgress
-        from scenes.files.loading import load_scenario
 
-        loaded = load_scenario(scenario, overrides or [])
+        loaded = mmslam.load_scenario(scenario, overrides or [])
         with stdout_kept_clean(), StageProgress() as progress:
-            from mmslam.measurement_files import simulate_to_file
+            from mmslam.pipeline import simulate_to_file
 
             measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
         print_written(output, measurement, as_json)

@@ -12,23 +12,43 @@ import typer
 from mmslam.output import OutputError
 from mmslam.terminal.interruption import ResumableInterruption, interruptions_held
 from mmslam.terminal.task_progress import WorkProgress, told_size, told_time
-from simulator.dataset.builder import (
-    DatasetJob,
-    Forecast,
-    Summary,
-    forecast,
-    make_dataset,
-    plan_dataset,
-    progress_of,
-)
+from simulator.dataset import builder
+from simulator.dataset.builder import Forecast, Summary
 from simulator.dataset.store import DatasetError
 from simulator.dataset.task_runner import WorkError, Workers
 
 _TOLD_FAILURES = 10
 
 
-def make(config: Path, target: Path, *, workers: Workers, retry_failed: bool) -> Mapping[str, Any]:
-    """Make a dataset, with progress on stderr, and return the document for JSON.
+def make_dataset(
+    config: str | Path | Mapping[str, Any],
+    path: str | Path,
+    *,
+    workers: int = 0,
+    scheduler: str | None = None,
+    retry_failed: bool = False,
+    progress: builder.Tally | None = None,
+) -> Summary:
+    """Simulate many variations of a scenario into one store, or go on with one that was begun.
+
+    Parameters
+    ----------
+    config
+        A TOML file, or its tables (see ``mmslam dataset --schema``).
+    path
+        The store to make; open it by :func:`mmslam.open_dataset`.
+    workers
+        Processes; 0: this one. With more, a script needs ``if __name__ == "__main__":`` around it.
+    scheduler
+        Address of a Dask scheduler, whose workers are used instead.
+    retry_failed
+        Make samples again that have failed.
+    progress
+        Told how many samples are done, have failed, and there are.
+
+    Returns
+    -------
+    How many samples there are, have failed, and were made now.
 
     Raises
     ------
@@ -38,37 +58,65 @@ def make(config: Path, target: Path, *, workers: Workers, retry_failed: bool) ->
         If the dataset cannot go where it should, or its workers are lost.
     ResumableInterruption
         On Ctrl-C; says how to go on.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> config = {
+    ...     "base": "point_scatterers",
+    ...     "count": 3,
+    ...     "set": {"base_station.elements": 8, "radio.points": 8},
+    ...     "vary": {"noise.snr_db": {"kind": "uniform", "low": 10, "high": 30}},
+    ... }
+    >>> made = mmslam.make_dataset(config, "some.zarr")
+    >>> made.samples, made.failed
+    (3, 0)
     """
-    job = plan_dataset(config, target)
-    with _errors_told(), WorkProgress("samples") as progress:
+    given = config if isinstance(config, Mapping) else Path(config)
+    job = builder.plan_dataset(given, Path(path))
+    where = Workers(processes=workers, scheduler=scheduler)
+    tell = progress or (lambda done, failed, total: None)
+    with _errors_told():
         try:
-            if workers.in_this_process:
-                with interruptions_held() as let_through:
+            if not where.in_this_process:
+                return builder.make_dataset(
+                    job, workers=where, retry_failed=retry_failed, tell=tell
+                )
+            with interruptions_held() as let_through:
 
-                    def step(done: int, failed: int, total: int) -> None:
-                        progress(done, failed, total)
-                        let_through()
+                def step(done: int, failed: int, total: int) -> None:
+                    tell(done, failed, total)
+                    let_through()
 
-                    summary = make_dataset(
-                        job, workers=workers, retry_failed=retry_failed, tell=step
-                    )
-            else:
-                summary = make_dataset(
-                    job, workers=workers, retry_failed=retry_failed, tell=progress
+                return builder.make_dataset(
+                    job, workers=where, retry_failed=retry_failed, tell=step
                 )
         except KeyboardInterrupt:
-            done, samples = progress_of(job)
+            done, samples = builder.progress_of(job)
             raise ResumableInterruption(
                 f"interrupted; {done} of {samples} samples are done: the same command goes on"
             ) from None
-    return {"file": str(target), **_document(job, summary)}
+
+
+def make(config: Path, target: Path, *, workers: Workers, retry_failed: bool) -> Mapping[str, Any]:
+    """Make a dataset with its progress on stderr; return the document for JSON."""
+    with WorkProgress("samples") as progress:
+        summary = make_dataset(
+            config,
+            target,
+            workers=workers.processes,
+            scheduler=workers.scheduler,
+            retry_failed=retry_failed,
+            progress=progress,
+        )
+    return {"file": str(target), **_document(summary)}
 
 
 def look_ahead(config: Path, target: Path, *, workers: int) -> Mapping[str, Any]:
     """Judge by one sample what a dataset will take; return the document for JSON."""
-    job = plan_dataset(config, target)
+    job = builder.plan_dataset(config, target)
     with _errors_told():
-        found = forecast(job)
+        found = builder.forecast(job)
     return _forecast_document(found, target, workers)
 
 
@@ -127,12 +175,12 @@ def _errors_told() -> Iterator[None]:
         raise OutputError(str(error)) from error
 
 
-def _document(job: DatasetJob, summary: Summary) -> dict[str, Any]:
+def _document(summary: Summary) -> dict[str, Any]:
     return {
         "samples": summary.samples,
         "failed": summary.failed,
         "made_now": summary.made_now,
-        "seed": job.config.seed,
+        "seed": summary.seed,
         "failures": [
             {"sample": one.sample, "reason": one.reason, "parameters": dict(one.parameters)}
             for one in summary.failures

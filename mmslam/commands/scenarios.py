@@ -5,26 +5,27 @@ from pathlib import Path
 
 import typer
 
+from mmslam.library import load_scenario, scenarios
 from mmslam.output import OutputError
 from mmslam.terminal.exit_codes import stdout_kept_clean
-from scenes.files.loading import load_scenario, scenario_names, scenario_to_toml
+from scenes.files.loading import scenario_to_toml
 from scenes.files.relocatable import relocatable
 from scenes.scenario import Scenario
 
 
 def list_scenarios(*, export: Path | None, as_json: bool) -> None:
     """Print the built-in scenarios, and export all of them if a folder is given."""
-    scenarios = [load_scenario(name, []) for name in scenario_names()]
+    titles = scenarios()
     if export is not None:
-        for scenario in scenarios:
-            _export_toml(scenario, export)
+        for name in titles:
+            _export_toml(load_scenario(name), export)
     if as_json:
-        listed = [{"name": found.name, "title": found.title} for found in scenarios]
+        listed = [{"name": name, "title": title} for name, title in titles.items()]
         typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
         return
-    width = max((len(scenario.name) for scenario in scenarios), default=0)
-    for scenario in scenarios:
-        typer.echo(f"{scenario.name:<{width}}  {scenario.title}")
+    width = max(map(len, titles), default=0)
+    for name, title in titles.items():
+        typer.echo(f"{name:<{width}}  {title}")
 
 
 def show_scenario(

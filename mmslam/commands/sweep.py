@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from estimator.measurement.store import is_store
 from mmslam import output
+from mmslam.results.sweeps import Sweep, told_bound
 from mmslam.terminal.interruption import ResumableInterruption, interruptions_held
 from mmslam.terminal.task_progress import WorkProgress, told_time
 from simulator.dataset.task_runner import WorkError, Workers, compute_in_one_thread
@@ -17,21 +16,45 @@ from validation.sweep.sweep import (
     Outcome,
     SweepConfig,
     SweepJob,
+    Tally,
     missing_points,
     plan_sweep,
     run_point,
     run_sweep,
-    statistics,
 )
-from validation.sweep.tables import error_dataset, error_table
+from validation.sweep.tables import error_table
 
 SUMMARY, TABLE, STORE = "sweep.json", "errors.csv", "errors.zarr"
 FIGURES = ("errors.png", "distribution.png")
 DEFAULT_CACHE = Path("out") / "sweep_cache"
 
 
-def run(config: Path, folder: Path, *, cache: Path, workers: Workers) -> Mapping[str, Any]:
-    """Run a sweep, write its tables and figures, and return its summary.
+def sweep(
+    config: str | Path | Mapping[str, Any],
+    *,
+    folder: str | Path | None = None,
+    cache: str | Path = DEFAULT_CACHE,
+    workers: int = 0,
+    scheduler: str | None = None,
+    progress: Tally | None = None,
+) -> Sweep:
+    """Locate users over a grid of a scenario's keys, in many realisations of roughness and noise.
+
+    Parameters
+    ----------
+    config
+        A TOML file, or its tables (see ``mmslam sweep --schema``).
+    folder
+        Where tables and figures are written; an earlier sweep's are replaced, anything else is
+        refused. None: nowhere.
+    cache
+        What was computed is kept there: the same sweep goes on, a longer one computes what is new.
+    workers
+        Processes; 0: this one. With more, a script needs ``if __name__ == "__main__":`` around it.
+    scheduler
+        Address of a Dask scheduler, whose workers are used instead.
+    progress
+        Told how many points are done, have failed, and there are.
 
     Raises
     ------
@@ -41,17 +64,47 @@ def run(config: Path, folder: Path, *, cache: Path, workers: Workers) -> Mapping
         If the folder cannot be written, or the workers are lost.
     ResumableInterruption
         On Ctrl-C: what was computed is kept.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> config = {
+    ...     "base": "los_user",
+    ...     "realisations": 1,
+    ...     "set": {
+    ...         "base_station.elements": 32, "radio.points": 51,
+    ...         "users.user.position_m": [0.1, 0.3],
+    ...     },
+    ...     "vary": {"noise.snr_db": {"kind": "grid", "values": [10, 20]}},
+    ... }
+    >>> result = mmslam.sweep(config, cache="cache")
+    >>> [case["found"] for case in result.summary()["cases"]]
+    [1.0, 1.0]
     """
-    job = plan_sweep(config, cache)
-    with output.replacing(folder, refuse_foreign_sweep) as new:
-        outcomes = _computed(job, workers)
+    given = config if isinstance(config, Mapping) else Path(config)
+    job = plan_sweep(given, Path(cache))
+    where = Workers(processes=workers, scheduler=scheduler)
+    if folder is None:
+        return Sweep(config=job.config, outcomes=_computed(job, where, progress))
+    with output.replacing(Path(folder), refuse_foreign_sweep) as new:
+        found = Sweep(config=job.config, outcomes=_computed(job, where, progress))
         new.mkdir()
-        summary = _summary(job.config, outcomes)
-        (new / TABLE).write_text(error_table(outcomes, job.space), encoding="utf-8")
-        error_dataset(outcomes, job.config).to_zarr(new / STORE, zarr_format=3, consolidated=False)
-        _write_figures(new, job.config, outcomes)
-        (new / SUMMARY).write_text(json.dumps(summary, indent=2), encoding="utf-8")
-    return {"folder": str(folder), **summary}
+        _write(new, found, job)
+    return found
+
+
+def run(config: Path, folder: Path, *, cache: Path, workers: Workers) -> Mapping[str, Any]:
+    """Run a sweep with its progress on stderr; return the document for JSON."""
+    with WorkProgress("points") as progress:
+        found = sweep(
+            config,
+            folder=folder,
+            cache=cache,
+            workers=workers.processes,
+            scheduler=workers.scheduler,
+            progress=progress,
+        )
+    return {"folder": str(folder), **found.summary()}
 
 
 def look_ahead(config: Path, *, cache: Path, workers: int) -> Mapping[str, Any]:
@@ -90,7 +143,7 @@ def lines(document: Mapping[str, Any]) -> Iterator[str]:
     for case in document["cases"]:
         errors = [
             "-" if value is None else f"{1e3 * value:.3f}"
-            for value in (case["median_m"], case["most_m"], case["worst_m"], _told_bound(case))
+            for value in (case["median_m"], case["most_m"], case["worst_m"], told_bound(case))
         ]
         values = ", ".join(f"{key} = {value}" for key, value in case["parameters"].items())
         told = " ".join(f"{error:>10}" for error in errors)
@@ -113,18 +166,18 @@ def refuse_foreign_sweep(folder: Path) -> str | None:
     return None
 
 
-def _computed(job: SweepJob, workers: Workers) -> tuple[Outcome, ...]:
+def _computed(job: SweepJob, workers: Workers, progress: Tally | None) -> tuple[Outcome, ...]:
+    tell = progress or (lambda done, failed, total: None)
     try:
-        with WorkProgress("points") as progress:
-            if not workers.in_this_process:
-                return run_sweep(job, workers=workers, tell=progress)
-            with interruptions_held() as let_through:
+        if not workers.in_this_process:
+            return run_sweep(job, workers=workers, tell=tell)
+        with interruptions_held() as let_through:
 
-                def step(done: int, failed: int, total: int) -> None:
-                    progress(done, failed, total)
-                    let_through()
+            def step(done: int, failed: int, total: int) -> None:
+                tell(done, failed, total)
+                let_through()
 
-                return run_sweep(job, workers=workers, tell=step)
+            return run_sweep(job, workers=workers, tell=step)
     except WorkError as error:
         raise output.OutputError(str(error)) from error
     except KeyboardInterrupt:
@@ -133,50 +186,11 @@ def _computed(job: SweepJob, workers: Workers) -> tuple[Outcome, ...]:
         ) from None
 
 
-def _summary(config: SweepConfig, outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    cases: dict[int, list[Outcome]] = {}
-    for one in outcomes:
-        cases.setdefault(one.point % config.grid_size, []).append(one)
-    keys = [key for axis in config.grid for key in axis]
-    failed = {one.point: one.reason for one in outcomes if one.status == "failed"}
-    return {
-        "format": 1,
-        "title": config.title,
-        "seed": config.seed,
-        "points": config.points,
-        "realisations": config.realisations,
-        "failed": len(failed),
-        "failures": [{"point": point, "reason": why} for point, why in failed.items()],
-        "cases": [
-            {
-                "parameters": {key: case[0].parameters[key] for key in keys},
-                **_numbers(case),
-                "found": sum(one.status == "found" for one in case) / len(case),
-            }
-            for _, case in sorted(cases.items())
-        ],
-    }
-
-
-def _told_bound(case: Mapping[str, Any]) -> float | None:
-    """Return the bound that holds for a wall that is found; with no rough wall, the other."""
-    told: float | None = case["bound_with_walls_m"]
-    known: float | None = case["bound_m"]
-    return known if told is None else told
-
-
-def _numbers(case: Sequence[Outcome]) -> dict[str, float | None]:
-    found = dict(
-        zip(
-            ("median_m", "most_m", "worst_m"),
-            statistics([one.located for one in case]),
-            strict=True,
-        )
-    )
-    for field in ("bound", "bound_with_walls"):
-        known = [value for one in case if (value := getattr(one, field)) is not None]
-        found[f"{field}_m"] = float(np.median(known)) if known else np.inf
-    return {key: value if np.isfinite(value) else None for key, value in found.items()}
+def _write(new: Path, found: Sweep, job: SweepJob) -> None:
+    (new / TABLE).write_text(error_table(found.outcomes, job.space), encoding="utf-8")
+    found.to_xarray().to_zarr(new / STORE, zarr_format=3, consolidated=False)
+    _write_figures(new, job.config, found.outcomes)
+    (new / SUMMARY).write_text(json.dumps(found.summary(), indent=2), encoding="utf-8")
 
 
 def _write_figures(folder: Path, config: SweepConfig, outcomes: Sequence[Outcome]) -> None:

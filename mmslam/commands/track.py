@@ -7,19 +7,101 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Float
+from zarr.storage import LocalStore
 
-from estimator.measurement.store import read_measurement
-from estimator.results.estimate import Mirror, Progress
+from estimator.measurement import model
+from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import is_store
+from estimator.results.estimate import Progress, UserEstimate
 from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
 from mmslam import output
-from mmslam.moving_users import MovingUser, track_store
+from mmslam.measurement_files import read
+from mmslam.moving_users import MovingUser, track_answers
+from mmslam.pipeline import locate
 from mmslam.results.document import plain, to_json, versions
+from mmslam.results.tracks import Tracks
 from validation.metrics.errors import position_error
 from validation.metrics.truth import read_truth
 
 Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
 """Where each user truly is at each time; empty where it is not known."""
+
+
+def track(
+    measurements: str | Path | Sequence[model.Measurement],
+    *,
+    step: float | None = None,
+    acceleration: float = ACCELERATION,
+    progress: Progress | None = None,
+) -> Tracks:
+    """Follow users that move: locate them at each time, and join the answers to tracks.
+
+    Parameters
+    ----------
+    measurements
+        A dataset whose samples are times (a variable ``time`` [sample] in seconds says when each
+        was measured), or measurements in the order of time.
+    step
+        Time between them; it goes before what the dataset says, and measurements by themselves
+        need it. [s]
+    acceleration
+        Spectral density of the users' acceleration: how freely they move. [m²/s³]
+    progress
+        Told each sample.
+
+    Returns
+    -------
+    The users by their names; a time without a user is one at which it was not found.
+
+    Raises
+    ------
+    MeasurementError
+        If the dataset cannot be read, has no samples, nobody says when they were measured, or no
+        sample holds a pilot.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> small = {"base_station.elements": 32, "radio.points": 51}
+    >>> walk = [
+    ...     mmslam.load_scenario("los_user", small | {"users.user.position_m": [x, 0.3]})
+    ...     for x in (0.06, 0.08, 0.10)
+    ... ]
+    >>> tracks = mmslam.track([mmslam.simulate(at, seed=1) for at in walk], step=0.1)
+    >>> [point.candidate for point in tracks["user"].track.points]
+    [0, 0, 0]
+    """
+    if not 0 < acceleration < np.inf:
+        raise MeasurementError(
+            f"acceleration = {acceleration:g} m²/s³: it must be above 0; somebody who walks has "
+            f"about {ACCELERATION:g}"
+        )
+    if isinstance(measurements, str | Path):
+        path = Path(measurements)
+        times = _times(path, step)
+
+        def at(sample: int) -> model.Measurement:
+            return read(path, sample=sample)
+
+        source = f"{path}: "
+    else:
+        given = measurements
+        times = _steps(len(given), step)
+        at, source = given.__getitem__, ""
+    tell = progress or (lambda stage, done, total: None)
+    tell("samples", 0, len(times))
+    found: list[dict[str, UserEstimate]] = []
+    for sample in range(len(times)):
+        estimate = locate(at(sample))
+        found.append({user.name: user for user in estimate.users})
+        tell("samples", sample + 1, len(times))
+    users = track_answers(times, found, acceleration=acceleration)
+    if not users:
+        raise MeasurementError(f"{source}no sample holds an uplink; a track needs users' pilots")
+    assert estimate.aperture is not None
+    return Tracks(users=users, mirrors=estimate.mirrors, aperture=estimate.aperture)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,25 +141,17 @@ def track_to_folder(
     output.refuse_to_replace_input(folder, path)
     with output.replacing(folder, output.refuse_foreign_track) as new:
         new.mkdir()
-        rooms: list[tuple[Mirror, ...]] = []
-        users = track_store(
-            path,
-            step=step,
-            acceleration=acceleration,
-            progress=progress,
-            located=lambda estimate: rooms.append(estimate.mirrors),
-        )
+        tracks = track(path, step=step, acceleration=acceleration, progress=progress)
+        users = tracks.users
         truths = [
             read_truth(path, sample=sample).user_position for sample in range(len(users[0].times))
         ]
         document = track_document(users, truths, acceleration=acceleration)
-        measurement = read_measurement(path, sample=0)
-        measured = measurement.echo or measurement.uplinks[0]
         # matplotlib's import takes half a second that other commands need not wait.
         from mmslam.results.pictures_2d import save
         from mmslam.results.track_figure import track_figure
 
-        figure = track_figure(users, truths, rooms[-1], measured.positions)
+        figure = track_figure(users, truths, tracks.mirrors, tracks.aperture)
         save(figure, new / output.TRACK_FIGURE)
         (new / output.TRACK).write_text(to_json(document), encoding="utf-8")
     return Tracked(folder=folder, document=document)
@@ -168,3 +242,40 @@ def _point(point: TrackPoint, truth: Float[np.ndarray, " 3"] | None) -> dict[str
         "truth_m": truth,
         "error_m": position_error(point.position, truth),
     }
+
+
+def _times(path: Path, step: float | None) -> list[float]:
+    if not is_store(path):
+        raise MeasurementError(
+            f"{path}: not a Zarr v3 group (no zarr.json in it); name a dataset with samples"
+        )
+    with xr.open_zarr(LocalStore(path, read_only=True), consolidated=False, chunks=None) as dataset:
+        count = dataset.sizes.get("sample", 0)
+        told = dataset["time"].values if "time" in dataset.variables else None
+    if count < 2:
+        raise MeasurementError(
+            f"{path}: a track needs several samples, this store has {max(count, 1)}; "
+            "measure at several times, or use `mmslam locate`"
+        )
+    if step is not None:
+        return _steps(count, step)
+    if told is None:
+        raise MeasurementError(
+            f"{path}: no variable 'time' says when the samples were measured; give the step"
+        )
+    if told.shape != (count,) or not np.all(np.diff(told.astype(float)) > 0):
+        raise MeasurementError(
+            f"{path}: 'time' has shape {told.shape} or does not increase; it must be one time in "
+            f"seconds for each of the {count} samples, in order"
+        )
+    return [float(time) for time in told]
+
+
+def _steps(count: int, step: float | None) -> list[float]:
+    if step is None:
+        raise MeasurementError("nothing says when the measurements were made; give the step")
+    if not 0 < step < np.inf:
+        raise MeasurementError(f"step = {step:g} s; the time between samples must be above 0")
+    if count < 2:
+        raise MeasurementError(f"a track needs several measurements, there is {count}")
+    return [step * index for index in range(count)]

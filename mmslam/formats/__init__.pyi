@@ -3,7 +3,7 @@ from .export_arrays import export_matlab, export_netcdf
 from .export_touchstone import refuse_foreign_touchstone
 from .import_full_wave import import_npz
 from .import_measured import Import
-from .mapping import PositionTable, SweepMapping, load_mapping, mapping_schema
+from .mapping import PositionTable, SweepMapping, checked_mapping, load_mapping, mapping_schema
 from .measured_signals import FolderReader
 from .numpy_files import npz_arrays
 from .touchstone_files import read_touchstone, touchstone_text
@@ -15,6 +15,7 @@ __all__ = [
     "Import",
     "PositionTable",
     "SweepMapping",
+    "checked_mapping",
     "export_matlab",
     "export_netcdf",
     "import_npz",

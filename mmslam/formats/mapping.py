@@ -5,6 +5,7 @@ sample is read; see :class:`SweepMapping` for the keys.
 """
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -293,11 +294,29 @@ def load_mapping(path: Path) -> SweepMapping:
         raise MeasurementError(f"{path}: not valid TOML: {error}; correct it there") from None
     except RecursionError:
         raise MeasurementError(f"{path}: nested too deeply; is it a mapping?") from None
+    return checked_mapping(data, place=f"{path}: ")
+
+
+def checked_mapping(tables: Mapping[str, Any], *, place: str = "mapping: ") -> SweepMapping:
+    """Check a mapping's tables, as :func:`load_mapping` does those of a file.
+
+    Parameters
+    ----------
+    tables
+        As a TOML file would give them.
+    place
+        What messages begin with.
+
+    Raises
+    ------
+    MeasurementError
+        If a key is missing, unknown or impossible: a line for each.
+    """
     try:
-        return SweepMapping.model_validate(data)
+        return SweepMapping.model_validate(dict(tables))
     except ValidationError as error:
         found = problems(error, SweepMapping)
-        raise MeasurementError("\n".join(f"{path}: {_plain(line)}" for line in found)) from None
+        raise MeasurementError("\n".join(f"{place}{_plain(line)}" for line in found)) from None
 
 
 def mapping_schema() -> dict[str, Any]:

@@ -66,7 +66,7 @@ def space_figure(
 ) -> Figure:
     """Draw what was found from three sides, and each user enlarged from above."""
     true_positions = list(truth.user_position.values())
-    box = _box(estimate, positions, true_positions)
+    box = box_of(estimate, positions, true_positions)
     found = [user for user in estimate.users if user.position is not None][:_CLOSE_UPS]
     figure, grid = _three_views(box, extra=3.6 if found else 0.0)
     for view, cell in zip(figures_3d.VIEWS, grid, strict=False):
@@ -91,11 +91,12 @@ def space_figure(
     return figure
 
 
-def _box(
+def box_of(
     estimate: Estimate,
     positions: Float[np.ndarray, "positions 3"],
     true_positions: list[Float[np.ndarray, " 3"]],
 ) -> figures_3d.Box:
+    """Return the part of space that shows all that was found, and all true positions [m]."""
     points = [views.estimate_points(estimate, positions), *_found(estimate)]
     return figures_3d.box_around(np.concatenate([*points, *(p[None] for p in true_positions)]))
 

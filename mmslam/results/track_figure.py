@@ -35,23 +35,45 @@ def track_figure(
     positions
         Of the array. [m]
     """
-    ways = [np.array([point.position for point in user.track.points]) for user in users]
-    ways = [way for way in ways if len(way)]
-    walls = [np.stack([mirror.start, mirror.end]) for mirror in mirrors]
-    known = [np.array(list(truth.values())) for truth in truths if truth]
     figure = Figure(figsize=(13, 6), layout="constrained")
     plan, near = figure.subplots(1, 2)
-    for ax, points in ((plan, [positions, *walls, *ways, *known]), (near, [*ways, *known])):
-        if points:
-            figures_2d.in_metres(ax, views.view_around(np.concatenate(points)))
-        for colour, user in zip(np.resize(_COLOURS, len(users)), users, strict=True):
-            _draw_user(ax, user, truths, str(colour))
-    figures_2d.overlay_mirrors(plan, mirrors, colour=figures_2d.MIRROR)
-    figures_2d.overlay_array(plan, positions)
+    draw_tracks(plan, users, truths, mirrors, positions)
+    draw_tracks(near, users, truths)
     plan.set_title("Room and tracks")
     near.set_title("Tracks, smoothed, with their 95 % ellipses")
     near.legend(loc="best", fontsize=8)
     return figure
+
+
+def draw_tracks(
+    ax: Axes,
+    users: Sequence[MovingUser],
+    truths: Sequence[Mapping[str, Float[np.ndarray, " 3"]]],
+    mirrors: Sequence[Mirror] = (),
+    positions: Float[np.ndarray, "positions 3"] | None = None,
+) -> Axes:
+    """Draw tracks with their 95 % ellipses; with mirrors and array, the plan of the room.
+
+    Parameters
+    ----------
+    ax
+        Is given equal axes in metres.
+    users, truths, mirrors, positions
+        As in :func:`track_figure`.
+    """
+    points = [np.array([point.position for point in user.track.points]) for user in users]
+    points += [np.array(list(truth.values())) for truth in truths if truth]
+    points += [np.stack([mirror.start, mirror.end]) for mirror in mirrors]
+    points += [] if positions is None else [positions]
+    points = [some for some in points if len(some)]
+    if points:
+        figures_2d.in_metres(ax, views.view_around(np.concatenate(points)))
+    for colour, user in zip(np.resize(_COLOURS, len(users)), users, strict=True):
+        _draw_user(ax, user, truths, str(colour))
+    figures_2d.overlay_mirrors(ax, mirrors, colour=figures_2d.MIRROR)
+    if positions is not None:
+        figures_2d.overlay_array(ax, positions)
+    return ax
 
 
 def _draw_user(

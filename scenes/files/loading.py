@@ -9,6 +9,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenes.files.toml_writer import toml_text
 from scenes.meshes.foreign_scene import Geometry
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
@@ -22,6 +24,8 @@ _BEGIN = {
     "users": "position_m",
     "points": "position_m",
 }  # what a new table cannot do without
+
+_OVERRIDE = "override "
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -62,7 +66,20 @@ class ScenarioSource:
         return tables
 
 
-def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
+def scenario_titles() -> dict[str, str]:
+    """Return what each scenario of the library shows, in a line, by its name.
+
+    Examples
+    --------
+    >>> scenario_titles()["slam_2d"]
+    'A user without line of sight, found over one rough mirror (thesis 4.9 to 4.12)'
+    """
+    return {name: str(scenario_source(name).tables.get("title", "")) for name in scenario_names()}
+
+
+def load_scenario(
+    name_or_path: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()
+) -> Scenario:
     """Load a scenario of the library, or from a TOML file.
 
     Parameters
@@ -72,21 +89,34 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
         ``.toml``, holds a separator, or is a file). In a file, ``name`` may be missing; it is
         then the file's own name.
     overrides
-        ``"dotted.key=VALUE"``, applied in turn before anything is checked. VALUE is a TOML
-        literal, else a string. A missing table is made (``objects.post.kind=cylinder`` begins
-        a new object); what the scenario does not know is refused as in a file.
+        Values by dotted key, or ``"dotted.key=VALUE"`` with VALUE a TOML literal, else a string;
+        applied in turn before anything is checked. A missing table is made
+        (``objects.post.kind`` begins a new object); what the scenario does not know is refused
+        as in a file.
 
     Raises
     ------
     ScenarioError
         If there is no such scenario, the file cannot be read, or the scenario is impossible;
         each line names file, key, value, limit and remedy.
+
+    Examples
+    --------
+    >>> room = load_scenario("slam_2d", {"objects.wall.angle_deg": 40, "noise.snr_db": 10})
+    >>> room.objects["wall"].angle_deg
+    40.0
+    >>> load_scenario("slam_2d", ["users.user.position_m=[0.9, 0.8]"]).users["user"].position
+    array([0.9, 0.8, 0. ])
     """
+    name_or_path = str(name_or_path)
     source = scenario_source(name_or_path)
     try:
+        if isinstance(overrides, Mapping):
+            values = {key: _as_read(value) for key, value in overrides.items()}
+            return source.variant(lambda tables: set_keys(tables, values, by=_OVERRIDE))
         return source.variant(lambda tables: _override(tables, overrides))
     except ScenarioError as error:
-        if str(error).startswith("--set "):
+        if str(error).startswith(("--set ", _OVERRIDE)):
             raise
         lines = [f"{name_or_path}: {line}" for line in str(error).splitlines()]
         raise ScenarioError("\n".join(lines)) from None
@@ -212,6 +242,13 @@ def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
             )
         _set(key, _literal(text.strip()), data, shown_as=f"--set {override!r}")
     _refuse_new_names(data, known, "--set ")
+
+
+def _as_read(value: object) -> object:
+    """Turn a value of Python's or NumPy's into what reading a TOML file would give."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _refuse_new_names(data: dict[str, Any], known: Mapping[str, set[str]], by: str) -> None:

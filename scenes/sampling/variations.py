@@ -185,13 +185,13 @@ class Variations(Checked):
 _T = TypeVar("_T", bound=Variations)
 
 
-def load_variations(path: Path, model: type[_T]) -> _T:
-    """Read a TOML file of variations.
+def load_variations(config: Path | Mapping[str, Any], model: type[_T]) -> _T:
+    """Read variations from a TOML file, or from tables like those of one.
 
     Parameters
     ----------
-    path
-        The file.
+    config
+        The file, or its tables.
     model
         What it holds: :class:`Variations`, or more.
 
@@ -200,13 +200,19 @@ def load_variations(path: Path, model: type[_T]) -> _T:
     ScenarioError
         If it cannot be read, or a key is missing, unknown or impossible: a line for each.
     """
+    if isinstance(config, Mapping):
+        return _checked(config, model, "")
+    return _checked(_tables(config), model, f"{config}: ")
+
+
+def _tables(path: Path) -> dict[str, Any]:
     try:
         if path.is_file() and path.stat().st_size > LARGEST_FILE:
             raise ScenarioError(
                 f"{path}: {path.stat().st_size} bytes are more than a configuration's "
                 f"{LARGEST_FILE}; is it another file?"
             )
-        data = tomllib.loads(path.read_bytes().decode())
+        return tomllib.loads(path.read_bytes().decode())
     except OSError as error:
         raise ScenarioError(
             f"{path}: cannot be read ({error.strerror}); give the TOML file that says what varies"
@@ -219,15 +225,18 @@ def load_variations(path: Path, model: type[_T]) -> _T:
         raise ScenarioError(f"{path}: not valid TOML: {error}; correct it there") from None
     except RecursionError:
         raise ScenarioError(f"{path}: nested too deeply; is it a configuration?") from None
+
+
+def _checked(tables: Mapping[str, Any], model: type[_T], place: str) -> _T:
     try:
-        read = model.model_validate(data)
+        read = model.model_validate(tables)
         _ = read.samples  # refused now, not when it is first asked for
     except ValidationError as error:
         found = [
             line.removeprefix(": ").replace("the scenario = ", "the configuration = ")
             for line in problems(error, model)
         ]
-        raise ScenarioError("\n".join(f"{path}: {line}" for line in found)) from None
+        raise ScenarioError("\n".join(f"{place}{line}" for line in found)) from None
     except ScenarioError as error:
-        raise ScenarioError(f"{path}: {error}") from None
+        raise ScenarioError(f"{place}{error}") from None
     return read

@@ -63,6 +63,7 @@ class Summary:
     failed: int
     failures: tuple[Failure, ...]  # the first ones
     made_now: int  # samples that this run has made
+    seed: int  # of all that was drawn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,13 +93,14 @@ class DatasetJob:
         return SampleSpace(self.source, self.config)
 
 
-def plan_dataset(path: Path, target: Path) -> DatasetJob:
+def plan_dataset(config: Path | Mapping[str, Any], target: Path) -> DatasetJob:
     """Read and check a dataset's configuration, before any work.
 
     Parameters
     ----------
-    path
-        Its TOML file; see :class:`simulator.dataset.config.DatasetConfig`.
+    config
+        Its TOML file, or the tables of one; see :class:`simulator.dataset.config.DatasetConfig`.
+        Paths in it are relative to the file, or else to the current folder.
     target
         The store to make.
 
@@ -107,11 +109,11 @@ def plan_dataset(path: Path, target: Path) -> DatasetJob:
     ScenarioError
         If something is missing, unknown or impossible: a line for each problem.
     """
-    config = load_variations(path, DatasetConfig)
-    space = open_sample_space(config, path.parent)
+    told = load_variations(config, DatasetConfig)
+    space = open_sample_space(told, config.parent if isinstance(config, Path) else Path.cwd())
     space.check()
     return DatasetJob(
-        source=space.source, config=config, target=target.resolve(), identity=identity(space)
+        source=space.source, config=told, target=target.resolve(), identity=identity(space)
     )
 
 
@@ -155,7 +157,13 @@ def make_dataset(
         ) from error
     failures = tuple(_failures(job.target, layout))
     failed = sum(1 for _ in failed_samples(job.target))
-    return Summary(samples=layout.samples, failed=failed, failures=failures, made_now=made)
+    return Summary(
+        samples=layout.samples,
+        failed=failed,
+        failures=failures,
+        made_now=made,
+        seed=job.config.seed,
+    )
 
 
 def forecast(job: DatasetJob) -> Forecast:

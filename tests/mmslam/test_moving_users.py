@@ -9,7 +9,8 @@ import xarray as xr
 from estimator.measurement.model import Measurement, MeasurementError, Uplink
 from estimator.measurement.store import measurement_to_dataset, write_measurement
 from estimator.results.estimate import UserEstimate
-from mmslam.moving_users import track_answers, track_store
+from mmslam.commands.track import track
+from mmslam.moving_users import track_answers
 from validation.analytic.point_scatterer import complex_noise, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 101)  # 0.4 m of unambiguous path
@@ -58,7 +59,7 @@ def test_two_users_at_once_are_tracked_through_the_samples(
 ) -> None:
     timed = samples.assign(time=("sample", STEP * np.arange(3)))
     told: list[tuple[str, int, int]] = []
-    users = track_store(written(timed, tmp_path), progress=lambda *step: told.append(step))
+    users = track(written(timed, tmp_path), progress=lambda *step: told.append(step))
     assert [user.name for user in users] == ["ann", "bob"]
     assert told == [("samples", done, 3) for done in range(4)]
     for user in users:
@@ -94,18 +95,18 @@ def test_a_user_that_is_away_for_a_time_is_bridged() -> None:
 
 def test_what_is_no_series_of_measurements_is_refused(samples: xr.Dataset, tmp_path: Path) -> None:
     with pytest.raises(MeasurementError, match=r"no zarr\.json"):
-        track_store(tmp_path)
+        track(tmp_path)
     path = written(samples, tmp_path)
     with pytest.raises(MeasurementError, match="no variable 'time'"):
-        track_store(path)
+        track(path)
     with pytest.raises(MeasurementError, match="must be above 0"):
-        track_store(path, step=0.0)
+        track(path, step=0.0)
     written(samples.assign(time=("sample", np.array([0.0, 2.0, 1.0]))), tmp_path)
     with pytest.raises(MeasurementError, match="does not increase"):
-        track_store(path)
+        track(path)
     single = Measurement(
         echo=None, uplinks=(pilot(WAYS["ann"][0], "ann", np.random.default_rng(1)),)
     )
     write_measurement(tmp_path / "one.zarr", single)
     with pytest.raises(MeasurementError, match="needs several samples, this store has 1"):
-        track_store(tmp_path / "one.zarr", step=1.0)
+        track(tmp_path / "one.zarr", step=1.0)

@@ -103,6 +103,11 @@ def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
 
 
 def read_truth(path: Path, *, sample: int | None = None) -> Truth:
+    """Read where things really are from a measurement store, as :func:`read_truth_dataset` does."""
+    return truth_from_dataset(read_truth_dataset(path, sample=sample))
+
+
+def read_truth_dataset(path: Path, *, sample: int | None = None) -> xr.Dataset | None:
     """Read the group ``truth`` of a measurement store.
 
     Parameters
@@ -114,7 +119,7 @@ def read_truth(path: Path, *, sample: int | None = None) -> Truth:
 
     Returns
     -------
-    The truth; empty if the store holds none.
+    All that is known, its paths included; None if the store holds no truth.
 
     Raises
     ------
@@ -123,17 +128,16 @@ def read_truth(path: Path, *, sample: int | None = None) -> Truth:
     """
     group = Path(path) / "truth"
     if not group.exists():
-        return Truth()
+        return None
     try:
         with xr.open_zarr(path, group="truth", consolidated=False, chunks=None) as lazy:
             chosen = lazy.isel(sample=sample or 0) if "sample" in lazy.dims else lazy
-            dataset = chosen.load()
+            return chosen.load()
     except Exception as error:  # Zarr, codecs and JSON fail in many ways on a damaged store
         raise MeasurementError(
             f"{group}: the truth cannot be read ({type(error).__name__}: {error}); delete that "
             "folder to go on without a comparison, or write the store again"
         ) from error
-    return truth_from_dataset(dataset)
 
 
 def _points(dataset: xr.Dataset, name: str, dimension: str) -> Points:

@@ -136,13 +136,14 @@ class SweepJob:
         return SampleSpace(self.source, self.config)
 
 
-def plan_sweep(path: Path, cache: Path) -> SweepJob:
+def plan_sweep(config: Path | Mapping[str, Any], cache: Path) -> SweepJob:
     """Read and check a sweep's configuration, before any work.
 
     Parameters
     ----------
-    path
-        Its TOML file; see :class:`SweepConfig`.
+    config
+        Its TOML file, or the tables of one; see :class:`SweepConfig`. Paths in it are relative to
+        the file, or else to the current folder.
     cache
         Folder for noise-free measurements and outcomes.
 
@@ -151,10 +152,10 @@ def plan_sweep(path: Path, cache: Path) -> SweepJob:
     ScenarioError
         If something is missing, unknown or impossible: a line for each problem.
     """
-    config = load_variations(path, SweepConfig)
-    space = open_sample_space(config, path.parent)
+    told = load_variations(config, SweepConfig)
+    space = open_sample_space(told, config.parent if isinstance(config, Path) else Path.cwd())
     space.check()
-    return SweepJob(source=space.source, config=config, cache=cache.resolve())
+    return SweepJob(source=space.source, config=told, cache=cache.resolve())
 
 
 def run_sweep(job: SweepJob, *, workers: Workers, tell: Tally | None = None) -> tuple[Outcome, ...]:

@@ -1,0 +1,36 @@
+from .commands.dataset import make_dataset
+from .commands.design import design
+from .commands.sweep import sweep
+from .commands.track import track
+from .datasets import open_dataset
+from .library import Scenario, load_scenario, scenarios
+from .measurement import Echo, Measurement, Uplink
+from .measurement_files import import_measured, read, write
+from .pipeline import locate, simulate
+from .results.estimate import Estimate
+from .results.plots import plot_angle_range_map, plot_estimate, plot_image, plot_scenario, plot_user
+
+__all__ = [
+    "Echo",
+    "Estimate",
+    "Measurement",
+    "Scenario",
+    "Uplink",
+    "design",
+    "import_measured",
+    "load_scenario",
+    "locate",
+    "make_dataset",
+    "open_dataset",
+    "plot_angle_range_map",
+    "plot_estimate",
+    "plot_image",
+    "plot_scenario",
+    "plot_user",
+    "read",
+    "scenarios",
+    "simulate",
+    "sweep",
+    "track",
+    "write",
+]
