@@ -61,7 +61,10 @@ class Dataset:
         """What was drawn for each sample, by key; None where that is not known."""
         if not (self.path / PARAMETERS).exists():
             return None
-        return xr.open_zarr(self.path, group=PARAMETERS, consolidated=False, chunks=None)
+        drawn: xr.Dataset = xr.open_zarr(
+            self.path, group=PARAMETERS, consolidated=False, chunks=None
+        )
+        return drawn
 
     def to_xarray(self) -> xr.Dataset:
         """Return all samples as one lazy dataset, in the layout of the file, without the truth."""
@@ -70,7 +73,8 @@ class Dataset:
     @cached_property
     def _root(self) -> xr.Dataset:
         store = LocalStore(self.path, read_only=True)
-        return xr.open_zarr(store, consolidated=False, chunks=None)
+        root: xr.Dataset = xr.open_zarr(store, consolidated=False, chunks=None)
+        return root
 
     def __repr__(self) -> str:
         """Show what it holds."""

@@ -65,6 +65,19 @@ def write(path: str | Path, measurement: Measurement) -> None:
     ------
     OutputError
         If something else is at ``path``, or it cannot be written; nothing is left behind then.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import mmslam
+    >>> own = mmslam.Measurement.from_arrays(
+    ...     frequencies=np.linspace(220e9, 221e9, 5),
+    ...     positions=np.arange(4) * 0.5e-3,
+    ...     echo=np.ones((4, 5)),
+    ... )
+    >>> mmslam.write("own.zarr", own)
+    >>> mmslam.read("own.zarr").echo.samples.shape
+    (4, 5)
     """
     with output.replacing(Path(path), output.refuse_foreign_store) as new:
         proper = measurement.without_truth()

@@ -83,12 +83,17 @@ def locate(measurement: model.Measurement, *, progress: Progress | None = None) 
     --------
     >>> import mmslam
     >>> small = {
-    ...     "base_station.elements": 32, "radio.points": 51, "users.user.position_m": [0.1, 0.3]
+    ...     "base_station.elements": 48, "radio.stop_ghz": 230.0, "radio.points": 101,
+    ...     "objects.wall.centre_m": [0.0, 0.4], "objects.wall.length_m": 0.2,
+    ...     "users.user.position_m": [0.5, 0.4],
     ... }
-    >>> measurement = mmslam.simulate(mmslam.load_scenario("los_user", small), seed=1)
+    >>> measurement = mmslam.simulate(mmslam.load_scenario("slam_2d", small), seed=1)
     >>> estimate = mmslam.locate(measurement)
-    >>> estimate.users["user"].status
-    'found'
+    >>> estimate.users["user"].status, estimate.users["user"].bounces
+    ('found', 1)
+    >>> off = estimate.users["user"].position - measurement.truth.user_position["user"]
+    >>> bool(abs(off).max() < 4 * estimate.users["user"].uncertainty_m)
+    True
     """
     seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
     return Estimate.of(localization.locate(seen, progress=progress), seen)

@@ -79,7 +79,7 @@ def design(
     Examples
     --------
     >>> import mmslam
-    >>> design = mmslam.design(start_ghz=220, stop_ghz=330, distance_m=1.8)
+    >>> design = mmslam.design(start_ghz=220.0, stop_ghz=330.0, distance_m=1.8)
     >>> round(design["bandwidth"].value), design["bandwidth"].unit
     (110, 'GHz')
     """

@@ -69,13 +69,14 @@ def sweep(
     --------
     >>> import mmslam
     >>> config = {
-    ...     "base": "los_user",
+    ...     "base": "slam_2d",
     ...     "realisations": 1,
     ...     "set": {
-    ...         "base_station.elements": 32, "radio.points": 51,
-    ...         "users.user.position_m": [0.1, 0.3],
+    ...         "base_station.elements": 48, "radio.stop_ghz": 230.0, "radio.points": 101,
+    ...         "objects.wall.centre_m": [0.0, 0.4], "objects.wall.length_m": 0.2,
+    ...         "users.user.position_m": [0.5, 0.4],
     ...     },
-    ...     "vary": {"noise.snr_db": {"kind": "grid", "values": [10, 20]}},
+    ...     "vary": {"noise.snr_db": {"kind": "grid", "values": [20, 30]}},
     ... }
     >>> result = mmslam.sweep(config, cache="cache")
     >>> [case["found"] for case in result.summary()["cases"]]

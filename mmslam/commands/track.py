@@ -64,12 +64,16 @@ def track(
     Examples
     --------
     >>> import mmslam
-    >>> small = {"base_station.elements": 32, "radio.points": 51}
+    >>> small = {
+    ...     "base_station.elements": 48, "radio.stop_ghz": 230.0, "radio.points": 101,
+    ...     "objects.wall.centre_m": [0.0, 0.4], "objects.wall.length_m": 0.2,
+    ...     "users.user.position_m": [0.5, 0.4],
+    ... }
     >>> walk = [
-    ...     mmslam.load_scenario("los_user", small | {"users.user.position_m": [x, 0.3]})
-    ...     for x in (0.06, 0.08, 0.10)
+    ...     mmslam.load_scenario("slam_2d", small | {"users.user.position_m": [x, 0.4]})
+    ...     for x in (0.48, 0.50, 0.52)
     ... ]
-    >>> tracks = mmslam.track([mmslam.simulate(at, seed=1) for at in walk], step=0.1)
+    >>> tracks = mmslam.track([mmslam.simulate(at, seed=1) for at in walk], step=0.05)
     >>> [point.candidate for point in tracks["user"].track.points]
     [0, 0, 0]
     """
@@ -82,21 +86,20 @@ def track(
         path = Path(measurements)
         times = _times(path, step)
 
-        def at(sample: int) -> model.Measurement:
-            return read(path, sample=sample)
-
         source = f"{path}: "
+        series: Iterator[model.Measurement] = (
+            read(path, sample=sample) for sample in range(len(times))
+        )
     else:
-        given = measurements
-        times = _steps(len(given), step)
-        at, source = given.__getitem__, ""
+        times = _steps(len(measurements), step)
+        source, series = "", iter(measurements)
     tell = progress or (lambda stage, done, total: None)
     tell("samples", 0, len(times))
     found: list[dict[str, UserEstimate]] = []
-    for sample in range(len(times)):
-        estimate = locate(at(sample))
+    for measurement in series:
+        estimate = locate(measurement)
         found.append({user.name: user for user in estimate.users})
-        tell("samples", sample + 1, len(times))
+        tell("samples", len(found), len(times))
     users = track_answers(times, found, acceleration=acceleration)
     if not users:
         raise MeasurementError(f"{source}no sample holds an uplink; a track needs users' pilots")

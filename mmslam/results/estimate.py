@@ -11,6 +11,9 @@ from dataclasses import dataclass, fields
 from math import degrees, sqrt
 from typing import TYPE_CHECKING, Any, SupportsIndex, TypeVar, overload
 
+import numpy as np
+from jaxtyping import Float
+
 from estimator.measurement import model
 from estimator.results import estimate as plain
 from mmslam.table import Table, html, text
@@ -355,7 +358,7 @@ def _targets_table(targets: Sequence[plain.Target]) -> Table:
     return Table(heads=heads, rows=rows)
 
 
-def _point(place: Sequence[float]) -> str:
+def _point(place: Float[np.ndarray, " 3"]) -> str:
     """Write a point; in the plane z = 0, without its z."""
     shown = place[:2] if place[2] == 0 else place
     return "(" + ", ".join(f"{value:.4f}" for value in shown) + ")"
