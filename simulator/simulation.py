@@ -8,6 +8,7 @@ import xarray as xr
 from estimator.measurement.model import Echo, Measurement, Uplink
 from scenes.scenario import Scenario
 from simulator.antennas.ports import Ports
+from simulator.multibounce.chain_count import check_chains
 from simulator.receiver.receiver import received
 from simulator.response.echo import simulate_echo
 from simulator.response.multistatic import multistatic_echo, multistatic_scene
@@ -46,7 +47,7 @@ def simulate(
     Raises
     ------
     ScenarioError
-        If nothing at all is received.
+        If nothing at all is received, or chains of ``max_bounces`` surfaces are out of reach.
     """
     station, frequencies = scenario.base_station, scenario.radio.frequencies
     flaws = scenario.impairments
@@ -60,6 +61,12 @@ def simulate(
     else:
         scene = radio_scene(scenario, seed=seed, sample=sample)
         if scene.facets is not None and not station.multistatic and not in_space(scenario):
+            check_chains(
+                scene.mutual_visibility.faces,
+                max_bounces=scenario.max_bounces,
+                elements=len(elements),
+                users=len(scenario.users),
+            )
             array = facet_ports(scene, scene.facets, station.antenna, scene.elements)
         echo = simulate_echo(
             scene,

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scenes.scenario import Scenario
 from scenes.schema.materials import Slab
 from simulator.geometry.mean_surfaces import mean_surfaces, rms_height
-from simulator.geometry.ray_scene import HALF_HEIGHT, build_scene
+from simulator.geometry.ray_scene import HALF_HEIGHT, sionna_rt_scene
 from simulator.materials.sionna_materials import ANGLE_OF_INCIDENCE, radio_material
 from simulator.scene.radio_scene import scenario_materials
 
@@ -75,7 +75,7 @@ def sionna_scene(
         )
         for name, material in scenario_materials(scenario).items()
     }
-    scene = build_scene(
+    scene = sionna_rt_scene(
         surfaces,
         materials=materials,
         frequency=scenario.radio.centre_frequency if frequency is None else frequency,

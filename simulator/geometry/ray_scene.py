@@ -1,6 +1,7 @@
 """The scene that rays are traced in: a Sionna RT scene of the scenario's surfaces."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -17,8 +18,14 @@ mi.set_variant(engine.mitsuba_variant())
 import sionna.rt as rt  # noqa: E402  the variant has to be chosen first
 
 CLEARANCE = 2e-6
-"""How far from its facet a ray starts: single precision places a vertex at 1 m within
-0.1 µm, and 2 µm hides nothing that scatters at a millimetre's wavelength. [m]"""
+"""How far from its facet a ray starts at least: 2 µm hide nothing that scatters at a millimetre's
+wavelength. [m]"""
+
+CLEARANCE_OF_EXTENT = 2e-6
+"""The same over the farthest coordinate from the scene's centre: 17 roundings of single precision,
+of which vertices, the ray's start and its direction cost about one each, and the intersection some
+more (C. Wächter and N. Binder, "A fast and robust method for avoiding self-intersection", 2019,
+doi:10.1007/978-1-4842-4427-2_6, take offsets in proportion to coordinates, too). [-]"""
 
 HALF_HEIGHT = 0.05
 """Half the height of the strips that stand for line facets; rays run at z = 0. [m]."""
@@ -27,24 +34,71 @@ RAYS_AT_ONCE = 4_000_000
 """Rays traced in one go: about 300 MB of single-precision rays."""
 
 
-def build_scene(
+@dataclass(frozen=True)
+class RayScene:
+    """Surfaces that rays are tested against, in coordinates about their own centre.
+
+    Rays are traced in single precision, which resolves so many parts of a coordinate: about the
+    centre it resolves the scene's extent alike wherever the scene stands.
+    """
+
+    scene: rt.Scene
+    centre: Float[np.ndarray, " 3"]  # of the box around all surfaces [m]
+    clearance: float  # how far off a surface a ray has to start and to end [m]
+
+    @property
+    def objects(self) -> Mapping[str, rt.SceneObject]:
+        """Surfaces by name, about the centre."""
+        objects: Mapping[str, rt.SceneObject] = self.scene.objects
+        return objects
+
+    def about_centre(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Return points of the world in the scene's own coordinates [m]."""
+        return np.asarray(points - self.centre)
+
+
+def build_scene(surfaces: Sequence[Surface]) -> RayScene:
+    """Build the scene that rays are tested in; each surface becomes an object of its name.
+
+    Parameters
+    ----------
+    surfaces
+        Lines become upright strips.
+
+    Raises
+    ------
+    ValueError
+        If two surfaces have one name.
+    """
+    points = np.concatenate([np.zeros((0, 3)), *(surface.vertices for surface in surfaces)])
+    centre, extent = np.zeros(3), 0.0
+    if len(points):
+        centre = (points.min(axis=0) + points.max(axis=0)) / 2
+        extent = float(np.abs(points - centre).max())
+    return RayScene(
+        scene=_scene(surfaces, centre, HALF_HEIGHT),
+        centre=centre,
+        clearance=max(CLEARANCE, CLEARANCE_OF_EXTENT * extent),
+    )
+
+
+def sionna_rt_scene(
     surfaces: Sequence[Surface],
     *,
-    materials: Mapping[str, rt.RadioMaterial] | None = None,
-    frequency: float | None = None,
+    materials: Mapping[str, rt.RadioMaterial],
+    frequency: float,
     half_height: float = HALF_HEIGHT,
 ) -> rt.Scene:
-    """Build a Sionna RT scene; each surface becomes an object of its name.
+    """Build a Sionna RT scene in the world's coordinates, for Sionna's own solvers.
 
     Parameters
     ----------
     surfaces
         Lines become upright strips.
     materials
-        Radio material of each surface, by the surface's name; without, all are conductors,
-        which does for rays that only ask what they meet.
+        Radio material of each surface, by the surface's name.
     frequency
-        Of the scene, to which materials adapt; Sionna's own default without. [Hz]
+        Of the scene, to which materials adapt. [Hz]
     half_height
         Half the height of the strips. [m]
 
@@ -53,24 +107,30 @@ def build_scene(
     ValueError
         If two surfaces have one name.
     """
+    scene = _scene(surfaces, np.zeros(3), half_height)
+    scene.frequency = frequency
+    if surfaces:
+        # Only now, since a material may be unknown at the frequency that Sionna begins with.
+        for one in scene.objects.values():
+            one.radio_material = materials[one.mi_mesh.id()]
+        scene.remove("/conductor")
+    return scene
+
+
+def _scene(
+    surfaces: Sequence[Surface], centre: Float[np.ndarray, " 3"], half_height: float
+) -> rt.Scene:
+    """Make all surfaces conductors: it does for rays that only ask what they meet."""
     names = [surface.name for surface in surfaces]
     if len(set(names)) < len(names):
         raise ValueError(f"surfaces {names}: each needs a name of its own; rename some")
     # Sionna's own 'metal' ends at 100 GHz; its constants do for a conductor at any frequency.
     # Its name is in the objects' name space, and none of theirs holds a slash.
     metal = rt.RadioMaterial("/conductor", relative_permittivity=1.0, conductivity=1e7)
-    meshes = {surface.name: _mesh(surface, half_height) for surface in surfaces}
+    meshes = {surface.name: _mesh(surface, centre, half_height) for surface in surfaces}
     for mesh in meshes.values():
         mesh.set_bsdf(metal)
-    scene = rt.Scene(_traced(meshes))
-    if frequency is not None:
-        scene.frequency = frequency
-    if materials is not None and meshes:
-        # Only now, since a material may be unknown at the frequency that Sionna begins with.
-        for one in scene.objects.values():
-            one.radio_material = materials[one.mi_mesh.id()]
-        scene.remove("/conductor")
-    return scene
+    return rt.Scene(_traced(meshes))
 
 
 def _traced(meshes: Mapping[str, mi.Mesh]) -> Any:
@@ -89,8 +149,8 @@ def _traced(meshes: Mapping[str, mi.Mesh]) -> Any:
     return scene
 
 
-def _mesh(surface: Surface, half_height: float) -> mi.Mesh:
-    vertices, faces = surface.vertices, surface.cells
+def _mesh(surface: Surface, centre: Float[np.ndarray, " 3"], half_height: float) -> mi.Mesh:
+    vertices, faces = surface.vertices - centre, surface.cells
     if faces.shape[1] == 2:
         vertices, faces = _extruded(vertices, faces, half_height)
     elif len(surface.screens):
@@ -115,17 +175,15 @@ def _extruded(
 
 
 def facets_visible(
-    scene: rt.Scene, facets: Facets, points: Float[np.ndarray, "points 3"]
+    rays: RayScene, facets: Facets, points: Float[np.ndarray, "points 3"]
 ) -> Bool[np.ndarray, "points facets"]:
     """Tell which facets each point sees, by a ray from just off the facet to the point."""
     visible = np.empty((len(points), facets.count), dtype=bool)
-    if not scene.objects or facets.count == 0:
+    if not rays.objects or facets.count == 0:
         visible[:] = True
         return visible
-    # Far from the origin, single precision places vertices more coarsely.
-    rounding = 4 * float(np.finfo(np.float32).eps) * float(np.abs(facets.centres).max(initial=0.0))
-    clearance = max(CLEARANCE, rounding)
-    centres, normals = (_double(values) for values in (facets.centres, facets.normals))
+    points = rays.about_centre(points)
+    centres, normals = _double(rays.about_centre(facets.centres)), _double(facets.normals)
     chunk = max(1, RAYS_AT_ONCE // facets.count)
     for first in range(0, len(points), chunk):
         some = points[first : first + chunk]
@@ -139,20 +197,20 @@ def facets_visible(
                 mi.Vector3d(*(dr.gather(mi.Float64, axis, index) for axis in values))
                 for values, index in ((centres, facet), (normals, facet), (_double(some), point))
             )
-        seen = ~_shadowed(scene, centre, normal, end, clearance)
+        seen = ~_shadowed(rays, centre, normal, end)
         visible[first : first + chunk] = np.asarray(seen.numpy()).reshape(len(some), facets.count)
     return visible
 
 
-def _shadowed(scene: rt.Scene, centre: Any, normal: Any, end: Any, clearance: float) -> Any:
+def _shadowed(rays: RayScene, centre: Any, normal: Any, end: Any) -> Any:
     """Trace from just off the facets; rays are made in double and traced in single precision."""
     side = dr.select(dr.dot(end - centre, normal) > 0.0, mi.Float64(1.0), mi.Float64(-1.0))
-    start = centre + clearance * side * normal
+    start = centre + rays.clearance * side * normal
     along = end - start
     length = dr.norm(along)
     ray: Any = mi.Ray3f(mi.Point3f(start), mi.Vector3f(along / length))
-    ray.maxt = mi.Float(length - CLEARANCE)
-    hit = scene.mi_scene.ray_test(ray)
+    ray.maxt = mi.Float(length - rays.clearance)
+    hit = rays.scene.mi_scene.ray_test(ray)
     dr.eval(hit)  # while the scene lives: read later, the result crashes
     return hit
 
@@ -167,20 +225,20 @@ def _place(point: Float[np.ndarray, " 3"]) -> Any:
 
 
 def blocked(
-    scene: rt.Scene,
+    rays: RayScene,
     starts: Float[np.ndarray, "*rays 3"],
     ends: Float[np.ndarray, "*rays 3"],
 ) -> Bool[np.ndarray, "*rays"]:
     """Tell which straight segments meet a surface, by Mitsuba's ``ray_test``."""
     shape = starts.shape[:-1]
-    if not scene.objects or 0 in shape:
+    if not rays.objects or 0 in shape:
         return np.zeros(shape, dtype=bool)
-    along = ends - starts
+    starts, along = rays.about_centre(starts), ends - starts
     lengths = np.linalg.norm(along, axis=-1)
     directions = along / lengths[..., None]
     ray: Any = mi.Ray3f(_single(starts, mi.Point3f), _single(directions, mi.Vector3f))
-    ray.maxt = mi.Float((lengths - CLEARANCE).ravel().astype(np.float32))
-    hit = scene.mi_scene.ray_test(ray)
+    ray.maxt = mi.Float((lengths - rays.clearance).ravel().astype(np.float32))
+    hit = rays.scene.mi_scene.ray_test(ray)
     dr.eval(hit)  # while the scene lives: read later, the result crashes
     return np.asarray(hit.numpy(), dtype=bool).reshape(shape)
 

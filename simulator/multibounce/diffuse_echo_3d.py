@@ -210,6 +210,7 @@ class _Target:
             sight.positions,
             centre[None],
             blocked=partial(blocked, self.scene.rays),
+            clearance=self.scene.rays.clearance,
         ).valid[:, 0]
         if not seen.any():
             return None

@@ -19,7 +19,7 @@ from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches
-from simulator.geometry.ray_scene import CLEARANCE, blocked
+from simulator.geometry.ray_scene import blocked
 from simulator.materials.reflection_coefficients import reflection_nodes
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, Factor, Look, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
@@ -183,7 +183,7 @@ def facets_within_reach(
     if not reached.any():
         return nothing
     of_owner = np.flatnonzero(facets.material == scene.scattering.index(owner))
-    limit: float = ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough] + CLEARANCE
+    limit: float = ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough] + scene.rays.clearance
     kept = []
     for some in np.array_split(of_owner, 1 + of_owner.size // FACETS_AT_ONCE):
         centres = facets.centres[some]
@@ -275,7 +275,7 @@ def _traced(
         return np.zeros((len(sight.positions), len(points)), dtype=bool)
     mirrors = scene.mirrors.mirrors
     side = np.sign(mirrors.heights(leg.image(sight).centre[None], chain.rough)[0])
-    lift = CLEARANCE + ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough]
+    lift = scene.rays.clearance + ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough]
     offset = lift * side * mirrors.normals[chain.rough]
     valid: np.ndarray = trace_chain(
         mirrors,
@@ -283,6 +283,7 @@ def _traced(
         sight.positions,
         points,
         blocked=partial(blocked, scene.rays),
+        clearance=scene.rays.clearance,
         receiver_offsets=np.broadcast_to(offset, points.shape),
     ).valid
     return valid

@@ -11,18 +11,19 @@ which for a conductor seen by one and the same antenna is
 :math:`\sqrt{\lambda/L}\, e^{j\pi/4}` with the length L of the whole path, so that flat mirrors
 give :math:`\lambda/4\pi L`.
 
-What is in it: chains of two and of three surfaces, each chain once for each order in which its
-surfaces are met. An echo is cut in the middle (out and back over any walls, or directly one of
-the ways), an uplink at its last surface. A single surface is left to plain physical optics.
-What is neglected: chains of four and more surfaces, several scatterings within one object,
-diffraction around an object beyond what its lit facets radiate, and the near field of facets
-closer to each other than a wavelength.
+What is in it: chains of two and more surfaces, up to the ``max_bounces`` asked for, each chain
+once for each order in which its surfaces are met. An echo is cut in the middle (out and back over
+any walls, or directly one of the ways), an uplink at its last surface. A single surface is left to
+plain physical optics. Which chains there are, and how much work:
+:mod:`simulator.multibounce.chain_count`.
+What is neglected: several scatterings within one object, diffraction around an object beyond what
+its lit facets radiate, and the near field of facets closer to each other than a wavelength.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement, pairwise, product
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -32,7 +33,9 @@ from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
+from simulator.materials.layered_media import Material
 from simulator.materials.reflection_table import reflection_table
+from simulator.multibounce.chain_count import Sees, chains_to, outline
 from simulator.multibounce.frequency_interpolation import (
     EveryFrequency,
     FewFrequencies,
@@ -48,23 +51,15 @@ from simulator.multibounce.iterative_physical_optics import (
     unit,
 )
 
-MOST_BOUNCES = 3
-"""Longest chain of surfaces that is summed. [-]"""
-
 WAVE_BYTES = 2**29
-"""What the waves at one block of a target's facets may take: 512 MiB. [byte]"""
+"""What the waves may take that are held at one time, at a block of a target's facets and, apart
+from these, at the walls before it: 512 MiB. [byte]"""
 
 FACETS_AT_ONCE = 1500
 """Most facets of a target in one block. [-]"""
 
 GAUSS_LIMITS = (0.24, 1.28, 2.6)
 """Half the phase over a facet up to which one, two and three Gauss points are within 1 %. [rad]"""
-
-OUTLINE = 64
-"""Points that stand for a surface where only its directions are asked for. [-]"""
-
-Sees = Callable[[Face, Face], Bool[np.ndarray, "one other"]]
-"""Tells which facets of two faces see each other."""
 
 SeveralProgress = Callable[[int, int], None]
 """Told how much is done, and of how much. [-]"""
@@ -76,21 +71,64 @@ def untold(done: int, total: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Passage:
-    """A wave from the ports over a wall to a target, not yet worked out."""
+    """A wave from the ports over walls to a target, not yet worked out."""
 
     ports: Ports
-    wall: Face
-    seen: Bool[np.ndarray, "wall target"]
-    bounds: Bounds
+    walls: tuple[Face, ...]  # in the order in which they are met, with the points of their phase
+    seen: tuple[Bool[np.ndarray, "_ _"], ...]  # of each wall and what follows it
+    bounds: tuple[Bounds, ...]  # at what follows each wall; the last are those at the target
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of lengths at one facet of the target. [m]."""
+        return self.bounds[-1].spread
 
     def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Passage":
         """Choose some of the target's facets."""
-        return replace(self, seen=self.seen[:, chosen], bounds=self.bounds.part(chosen))
+        return replace(
+            self,
+            seen=(*self.seen[:-1], self.seen[-1][:, chosen]),
+            bounds=(*self.bounds[:-1], self.bounds[-1].part(chosen)),
+        )
 
-    def arriving(self, target: Face, nodes: Float[np.ndarray, " nodes"]) -> Wave:
-        """Work the wave out."""
-        sent = direct(self.wall, self.ports, nodes)
-        return onward(sent, self.wall, target, self.seen, self.bounds, nodes)
+    def of_ports(self, some: slice) -> "Passage":
+        """Choose some of the ports."""
+        ports = replace(
+            self.ports, positions=self.ports.positions[some], visible=self.ports.visible[some]
+        )
+        return replace(
+            self, ports=ports, bounds=tuple(one.part(slice(None), some) for one in self.bounds)
+        )
+
+    def at_last_wall(self, nodes: Float[np.ndarray, " nodes"]) -> Wave:
+        """Work out the wave that the last wall sends on."""
+        wave = direct(self.walls[0], self.ports, nodes)
+        for place, (wall, onto) in enumerate(pairwise(self.walls)):
+            wave = onward(wave, wall, onto, self.seen[place], self.bounds[place], nodes)
+        return wave
+
+    def arriving(self, sent: Wave, target: Face, nodes: Float[np.ndarray, " nodes"]) -> Wave:
+        """Work out what arrives of the wave at the last wall."""
+        return onward(sent, self.walls[-1], target, self.seen[-1], self.bounds[-1], nodes)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Two waves that a target links: out and back, and how often their chain counts."""
+
+    factor: float
+    out: Passage
+    back: Passage | None  # None: directly
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of lengths. [m]."""
+        return self.out.spread + (0.0 if self.back is None else self.back.spread)
+
+    @property
+    def walls(self) -> tuple[Face, ...]:
+        """All walls but the target."""
+        return self.out.walls + (() if self.back is None else self.back.walls)
 
 
 def ghost_echo(
@@ -104,7 +142,7 @@ def ghost_echo(
     interpolate: bool = True,
     progress: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "ports freqs"]:
-    """Sum the monostatic echoes over two and three surfaces.
+    """Sum the monostatic echoes over two and more surfaces.
 
     Parameters
     ----------
@@ -123,7 +161,7 @@ def ghost_echo(
     interpolate
         Work the waves out at few frequencies and interpolate; otherwise at every frequency.
     progress
-        Told how many facets that chains are cut at are done.
+        Told how many are done of the facets that chains are cut at, counted for each port.
 
     Returns
     -------
@@ -133,35 +171,66 @@ def ghost_echo(
     if max_bounces < 2:
         return echo
     seen_directly = [bool(array.visible[:, face.source].any()) for face in faces]
-    cuts: list[tuple[Face, list[tuple[bool, Passage]]]] = []
+    cuts: list[tuple[Face, list[Link]]] = []
     for place, target in enumerate(faces):
-        passages: list[tuple[bool, Passage]] = []
-        for origin, wall in enumerate(faces):
-            # Two surfaces: met in either order, worked out once, at the later of them.
-            both = origin < place and seen_directly[place]
-            if wall.surface == target.surface or not seen_directly[origin]:
-                continue
-            if both or max_bounces > 2:
-                found = _passage(array, wall, target, sees, float(frequencies[-1]))
-                passages += [] if found is None else [(both, found)]
-        if passages:
-            met = np.flatnonzero(np.any([one.seen.any(axis=0) for _, one in passages], axis=0))
-            cuts.append((target.part(met), [(both, one.part(met)) for both, one in passages]))
-    done, facets = 0, sum(target.count for target, _ in cuts)
-    for target, passages in cuts:
-        for count, part in _echo_of(
-            target,
-            passages,
-            array,
-            frequencies,
-            waves=waves,
-            thrice=max_bounces > 2,
-            interpolate=interpolate,
+        passages = {
+            chain: found
+            for chain in chains_to(place, faces, sees, seen_directly, max_bounces // 2)
+            if (found := _passage(array, [faces[one] for one in chain], target, sees, frequencies))
+        }
+        links = _echo_links(passages, place, max_bounces, direct_back=seen_directly[place])
+        if links:
+            used = {id(one): one for link in links for one in (link.out, link.back) if one}
+            met = np.flatnonzero(
+                np.any([one.seen[-1].any(axis=0) for one in used.values()], axis=0)
+            )
+            parts = {key: one.part(met) for key, one in used.items()}
+            links = [
+                Link(link.factor, parts[id(link.out)], link.back and parts[id(link.back)])
+                for link in links
+            ]
+            cuts.append((target.part(met), links))
+    done, steps = 0, len(array.positions) * sum(target.count for target, _ in cuts)
+    for target, links in cuts:
+        for rows, count, part in _echo_of(
+            target, links, array, frequencies, waves=waves, interpolate=interpolate
         ):
-            echo += part
-            done += count
-            progress(done, facets)
+            echo[rows] += part
+            done += count * len(part)
+            progress(done, steps)
     return echo
+
+
+def _echo_links(
+    passages: Mapping[tuple[int, ...], Passage],
+    place: int,
+    max_bounces: int,
+    *,
+    direct_back: bool,
+) -> list[Link]:
+    """Pair the ways to a target: each chain of surfaces once, with the way it is run through back.
+
+    A chain of an odd number of surfaces is cut at its middle one, with as many walls on either
+    side. One of an even number is not its own reverse; of the two, the one is cut whose two middle
+    surfaces are met in their order, at the later of them.
+    """
+    links = []
+    for (i, (out, to)), (j, (back, fro)) in combinations_with_replacement(
+        enumerate(passages.items()), 2
+    ):
+        if len(out) == len(back) and 2 * len(out) + 1 <= max_bounces:
+            links.append(Link(1.0 + (i != j), to, fro))
+        for longer, shorter, one, other in ((out, back, to, fro), (back, out, fro, to)):
+            even = len(longer) == len(shorter) + 1 and 2 * len(longer) <= max_bounces
+            if even and longer[-1] < place:
+                links.append(Link(2.0, one, other))
+    if direct_back and max_bounces >= 2:
+        links += [
+            Link(2.0, one, None)
+            for chain, one in passages.items()
+            if len(chain) == 1 and chain[0] < place
+        ]
+    return links
 
 
 def uplink_over_surfaces(
@@ -176,7 +245,7 @@ def uplink_over_surfaces(
     interpolate: bool = True,
     progress: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "ports freqs"]:
-    """Sum what reaches each element from one user over two and three surfaces.
+    """Sum what reaches each element from one user over two and more surfaces.
 
     Parameters
     ----------
@@ -196,28 +265,47 @@ def uplink_over_surfaces(
     S-parameter at each element; with cylindrical waves, field per unit line source. [-]
     """
     pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    seen_directly = [bool(user.visible[:, face.source].any()) for face in faces]
     chains = [
-        chain
-        for bounces in range(2, min(max_bounces, MOST_BOUNCES) + 1)
-        for chain in product(faces, repeat=bounces)
-        if all(one.surface != next_.surface for one, next_ in pairwise(chain))
+        (*chain, place)
+        for place, last in enumerate(faces)
+        if array.visible[:, last.source].any()
+        for chain in chains_to(place, faces, sees, seen_directly, max_bounces - 1)
     ]
-    for done, chain in enumerate(chains, start=1):
-        pilot += _pilot_over(chain, sees, user, array, frequencies, waves, interpolate)
+    for done, chain in enumerate(sorted(chains, key=lambda one: (len(one), one)), start=1):
+        met = [faces[one] for one in chain]
+        pilot += _pilot_over(met, sees, user, array, frequencies, waves, interpolate)
         progress(done, len(chains))
     return pilot
 
 
-def _passage(ports: Ports, wall: Face, target: Face, sees: Sees, highest: float) -> Passage | None:
-    """Prepare the way over a wall, from the facets that the ports see; None if there is none."""
-    lit = np.flatnonzero(ports.visible[:, wall.source].any(axis=0))
-    wall, seen = _towards(wall.part(lit), target, ports.positions[:, :2], sees, highest)
-    if wall.count == 0:
+def _passage(
+    ports: Ports,
+    chain: Sequence[Face],
+    target: Face,
+    sees: Sees,
+    frequencies: Float[np.ndarray, " freqs"],
+) -> Passage | None:
+    """Prepare the way over walls, from the facets that the ports see; None if there is none."""
+    first = chain[0].part(np.flatnonzero(ports.visible[:, chain[0].source].any(axis=0)))
+    chain = [first, *chain[1:]]
+    walls: list[Face] = []
+    seen: list[Bool[np.ndarray, "_ _"]] = []
+    for place in reversed(range(len(chain))):  # each wall's points depend on what follows
+        before = chain[place - 1].centres if place else ports.positions[:, :2]
+        onto = walls[0] if walls else target
+        wall, sight = _towards(chain[place], onto, before, sees, float(frequencies[-1]))
+        if wall.count == 0:
+            return None
+        walls.insert(0, wall)
+        seen.insert(0, sight)
+    latest, bounds = direct(walls[0], ports, np.ones(1)).bounds, []
+    for wall, onto, sight in zip(walls, [*walls[1:], target], seen, strict=True):
+        latest = onward_bounds(latest, wall, onto, sight)
+        bounds.append(latest)
+    if not latest.longest.any():
         return None
-    bounds = onward_bounds(direct(wall, ports, np.ones(1)).bounds, wall, target, seen)
-    if not bounds.longest.any():
-        return None
-    return Passage(ports=ports, wall=wall, seen=seen, bounds=bounds)
+    return Passage(ports=ports, walls=tuple(walls), seen=tuple(seen), bounds=tuple(bounds))
 
 
 def _towards(
@@ -239,7 +327,7 @@ def _towards(
         return wall, seen
     low, high = np.zeros(wall.count), np.zeros(wall.count)
     for points in (before, target.centres):
-        apart = points[:: max(1, len(points) // OUTLINE), None] - wall.centres
+        apart = outline(points)[:, None] - wall.centres
         along = np.einsum("pfx,fx->pf", apart, wall.edges) / np.linalg.norm(apart, axis=-1)
         low, high = low + along.min(axis=0), high + along.max(axis=0)
     phase = np.pi * highest / speed_of_light * float(np.maximum(-low, high).max())
@@ -249,33 +337,69 @@ def _towards(
 
 def _echo_of(
     target: Face,
-    passages: Sequence[tuple[bool, Passage]],
+    links: Sequence[Link],
     array: Ports,
     frequencies: Float[np.ndarray, " freqs"],
     *,
     waves: Waves,
-    thrice: bool,
     interpolate: bool,
-) -> Iterator[tuple[int, Complex[np.ndarray, "ports freqs"]]]:
-    """Sum the chains that are cut at one target, for some of its facets at a time."""
-    spread = (1 + thrice) * max(one.bounds.spread for _, one in passages)
-    materials = [target.material] + (1 + thrice) * [one.wall.material for _, one in passages]
-    total = few_frequencies(frequencies, spread, materials, 2 * array.nodes, interpolate)
-    row_bytes = 16 * total.nodes.size * len(array.positions) * len(passages)
-    step = max(1, min(FACETS_AT_ONCE, WAVE_BYTES // row_bytes))
-    for first in range(0, target.count, step):
-        block = slice(first, min(first + step, target.count))
-        here = target.part(block)
-        sent = direct(here, array, total.nodes)
-        arriving = [one.part(block).arriving(here, total.nodes) for _, one in passages]
-        # Two ways to run through each chain that is not its own reverse.
-        links = [
-            (2.0, sent, wave) for (both, _), wave in zip(passages, arriving, strict=True) if both
-        ]
-        if thrice:
-            pairs = combinations_with_replacement(range(len(arriving)), 2)
-            links += [(1.0 + (i != j), arriving[i], arriving[j]) for i, j in pairs]
-        yield here.count, _linked(here, links, len(array.positions), total, waves)
+) -> Iterator[tuple[slice, int, Complex[np.ndarray, "ports freqs"]]]:
+    """Sum the chains that are cut at one target, for some ports and some of its facets at a time.
+
+    Yields which ports, how many facets, and their sum.
+    """
+    total = _few_frequencies(target, links, frequencies, 2 * array.nodes, interpolate)
+    passages = {id(one): one for link in links for one in (link.out, link.back) if one}
+    # At walls that others precede, waves vary with frequency; those at the first are small.
+    held = sum(one.walls[-1].count for one in passages.values() if len(one.walls) > 1)
+    ports, at_once = len(array.positions), max(1, WAVE_BYTES // (16 * total.nodes.size))
+    for row in range(0, ports, max(1, at_once // max(1, held))):
+        rows = slice(row, min(row + max(1, at_once // max(1, held)), ports))
+        antennas = replace(array, positions=array.positions[rows], visible=array.visible[rows])
+        some = {key: one.of_ports(rows) for key, one in passages.items()}
+        sent = {key: one.at_last_wall(total.nodes) for key, one in some.items()}
+        width = len(antennas.positions) * len(passages)
+        step = max(1, min(FACETS_AT_ONCE, at_once // width))
+        for first in range(0, target.count, step):
+            block = slice(first, min(first + step, target.count))
+            here = target.part(block)
+            arriving = {
+                key: one.part(block).arriving(sent[key], here, total.nodes)
+                for key, one in some.items()
+            }
+            directly = direct(here, antennas, total.nodes)
+            pairs = [
+                (
+                    link.factor,
+                    arriving[id(link.out)],
+                    directly if link.back is None else arriving[id(link.back)],
+                )
+                for link in links
+            ]
+            linked = _linked(here, pairs, len(antennas.positions), total, waves)
+            yield rows, here.count, linked
+
+
+def _few_frequencies(
+    target: Face,
+    links: Sequence[Link],
+    frequencies: Float[np.ndarray, " freqs"],
+    pattern_nodes: int,
+    interpolate: bool,
+) -> FewFrequencies | EveryFrequency:
+    """Choose the frequencies that do for all chains which are cut at one target."""
+    spreads: dict[tuple[int, ...], float] = {}
+    materials: dict[tuple[int, ...], list[Material]] = {}
+    for link in links:
+        made = [target.material, *(wall.material for wall in link.walls)]
+        key = tuple(sorted(id(one) for one in made))
+        spreads[key] = max(spreads.get(key, 0.0), link.spread)
+        materials[key] = made
+    choices = [
+        few_frequencies(frequencies, spread, materials[key], pattern_nodes, interpolate)
+        for key, spread in spreads.items()
+    ]
+    return max(choices, key=lambda choice: choice.nodes.size)
 
 
 def _pilot_over(
@@ -288,31 +412,16 @@ def _pilot_over(
     interpolate: bool,
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Take the user's wave over all surfaces of a chain to the array."""
-    pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    nothing = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     target = chain[-1]
     target = target.part(np.flatnonzero(array.visible[:, target.source].any(axis=0)))
-    first = chain[0]
-    if target.count == 0 or not user.visible[:, first.source].any():
-        return pilot
-    legs: list[tuple[Face, Bool[np.ndarray, "wall target"]]] = []
-    for index in reversed(range(len(chain) - 1)):  # from the array: each wall's points depend
-        before = chain[index - 1].centres if index else user.positions[:, :2]  # on what follows
-        onto = legs[0][0] if legs else target
-        legs.insert(0, _towards(chain[index], onto, before, sees, float(frequencies[-1])))
-        if legs[0][0].count == 0:
-            return pilot
-    faces = [wall for wall, _ in legs] + [target]
-    bounds = [direct(faces[0], user, np.ones(1)).bounds]
-    for (wall, seen), onto in zip(legs, faces[1:], strict=True):
-        bounds.append(onward_bounds(bounds[-1], wall, onto, seen))
-    if not bounds[-1].longest.any():
-        return pilot
+    passage = _passage(user, chain[:-1], target, sees, frequencies)
+    if passage is None:
+        return nothing
     materials = [face.material for face in chain]
     extra = user.nodes + array.nodes
-    total = few_frequencies(frequencies, bounds[-1].spread, materials, extra, interpolate)
-    wave = direct(faces[0], user, total.nodes)
-    for (wall, seen), onto, limits in zip(legs, faces[1:], bounds[1:], strict=True):
-        wave = onward(wave, wall, onto, seen, limits, total.nodes)
+    total = few_frequencies(frequencies, passage.spread, materials, extra, interpolate)
+    wave = passage.arriving(passage.at_last_wall(total.nodes), target, total.nodes)
     heard = direct(target, array, total.nodes)
     return _linked(target, [(1.0, wave, heard)], len(array.positions), total, waves)
 

@@ -27,7 +27,7 @@ from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches, patch_side
-from simulator.geometry.ray_scene import CLEARANCE, blocked
+from simulator.geometry.ray_scene import blocked
 from simulator.materials.reflection_coefficients import reflection_nodes
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, scattered_by_patches
@@ -179,7 +179,8 @@ class _Target:
             sight.positions,
             facets.centres[best],
             blocked=partial(blocked, self.scene.rays),
-            receiver_offsets=CLEARANCE * facets.normals[best],
+            clearance=self.scene.rays.clearance,
+            receiver_offsets=self.scene.rays.clearance * facets.normals[best],
         )
         return chain.valid
 
@@ -253,6 +254,7 @@ def _shares(
                 sources,
                 receivers + side * NUDGE,
                 blocked=partial(blocked, scene.rays),
+                clearance=scene.rays.clearance,
                 paired=True,
             ).valid
         )

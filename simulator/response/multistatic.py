@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import sionna.rt as rt
 from jaxtyping import Bool, Complex, Float
 
 from scenes.realisations.object_surface import Surface, object_surface
@@ -22,7 +21,7 @@ from scenes.schema.objects import Plate
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, surface_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
-from simulator.geometry.ray_scene import build_scene, facets_visible
+from simulator.geometry.ray_scene import RayScene, build_scene, facets_visible
 from simulator.materials.layered_media import Absorber, Material
 from simulator.scattering.bistatic_kernel import BistaticKernel, Port, pattern_table
 from simulator.scattering.physical_optics import scattered
@@ -160,7 +159,7 @@ class _Part:
 
     surface: Callable[[], Surface]
     material: Material
-    rays: rt.Scene  # what hides it, but for a plate's own facets
+    rays: RayScene  # what hides it, but for a plate's own facets
     ball: tuple[Float[np.ndarray, " 3"], float] | None  # around it; None: unknown
     sheet: PlateSheet | None = None
     tile: Tile | None = None
@@ -185,7 +184,7 @@ class _PartSums:
         self._surface: Surface | None = None
         self._kernel: BistaticKernel | None = None
         self._facets: Facets | None = None
-        self._close: rt.Scene | None = None
+        self._close: RayScene | None = None
         self._seen: dict[bytes, Bool[np.ndarray, " facets"] | None] = {}
 
     def __call__(self, link: _Link) -> Complex[np.ndarray, " freqs"]:
@@ -278,7 +277,11 @@ def _links(scene: MultistaticScene) -> list[_Link]:
 def _parts(scene: MultistaticScene) -> Iterator[tuple[_Part, tuple[float, float]]]:
     """Go over all that scatters; with each part, those before it and the number in all."""
     scenario = scene.scenario
-    names = [name for name in scenario.objects if not isinstance(scene.materials[name], Absorber)]
+    names = [
+        name
+        for name in scenario.objects
+        if scenario.max_bounces > 0 and not isinstance(scene.materials[name], Absorber)
+    ]
     for place, name in enumerate(names):
         body, material = scenario.objects[name], scene.materials[name]
         if not isinstance(body, Plate):

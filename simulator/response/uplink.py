@@ -123,6 +123,7 @@ def _over_mirrors(
             sender.positions,
             array.positions,
             blocked=partial(blocked, scene.rays),
+            clearance=scene.rays.clearance,
         )
         for leg in scene.mirrors.chains
         if 2 <= leg.bounces <= most

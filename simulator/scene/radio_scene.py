@@ -5,7 +5,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import sionna.rt as rt
 from jaxtyping import Float
 
 from scenes.random_streams import random_stream
@@ -18,7 +17,8 @@ from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.ports import Pattern, Ports, isotropic
 from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, scene_facets
-from simulator.geometry.ray_scene import build_scene, facets_visible
+from simulator.geometry.mean_surfaces import mean_surfaces
+from simulator.geometry.ray_scene import RayScene, build_scene, facets_visible
 from simulator.materials.layered_media import Absorber, Dielectric, Material, named_material
 from simulator.materials.permittivity import (
     ConstantPermittivity,
@@ -39,7 +39,7 @@ class RadioScene:
     """One realisation of a scenario: the same facets for every antenna and frequency."""
 
     scenario: Scenario
-    rays: rt.Scene
+    rays: RayScene
     facets: Facets | None  # None: nothing scatters
     elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
     scattering: tuple[str, ...] = ()  # names of the objects that the facets' materials belong to
@@ -68,6 +68,9 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
     """
     materials = scenario_materials(scenario)  # first: it is quick, and may fail
     elements = true_elements(scenario, seed=seed, sample=sample)
+    if scenario.max_bounces == 0:  # surfaces only block rays
+        rays = build_scene(mean_surfaces(scenario))
+        return RadioScene(scenario=scenario, rays=rays, facets=None, elements=elements)
     mirrors = _mirrors(scenario, materials, elements) if in_space(scenario) else None
     surfaces, scattering = [], {}
     for name, material in materials.items():

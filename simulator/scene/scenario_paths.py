@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -14,18 +15,16 @@ from scenes.schema.objects import Plate
 from simulator.antennas.field_pattern import field_gain
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
-from simulator.geometry.ray_scene import blocked, build_scene
+from simulator.geometry.ray_scene import RayScene, blocked, build_scene
 from simulator.materials.layered_media import Absorber
 from simulator.scene.radio_scene import scenario_materials
-from simulator.specular.image_method import Blocked, Chain, find_chains
+from simulator.specular.image_method import Chain, find_chains
 
 PLACES = 17
 """Places on each line of a target from which paths to the array are sought."""
 
 MOST_PER_TARGET = 3
 """Chains of mirrors shown for one target, the shortest ones."""
-
-_ON_SURFACE = 2e-6  # how far off its surface a target's place is tested for occlusion [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,33 +68,27 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     """
     surfaces = mean_surfaces(scenario)
     materials = scenario_materials(scenario)
-    scene = build_scene(surfaces)
+    rays = build_scene(surfaces)
     mirrors = mean_mirrors(scenario, surfaces, materials)
-
-    def meets(
-        starts: Float[np.ndarray, "rays 3"], ends: Float[np.ndarray, "rays 3"]
-    ) -> Bool[np.ndarray, " rays"]:
-        return blocked(scene, starts, ends)
-
     if scenario.base_station.multistatic:
-        return tuple(_to_receivers(scenario, mirrors, meets))
-    found = [*_to_users(scenario, mirrors, meets)]
+        return tuple(_to_receivers(scenario, mirrors, rays))
+    found = [*_to_users(scenario, mirrors, rays)]
     for surface in surfaces:
         body = scenario.objects[surface.name]
         if not isinstance(body, Plate) and not isinstance(materials[surface.name], Absorber):
-            found += _to_object(scenario, surface, mirrors, meets)
-    del scene
+            found += _to_object(scenario, surface, mirrors, rays)
     return tuple(found)
 
 
-def _to_users(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
+def _to_users(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[ScenarioPath]:
     centre = _centre(scenario)
     for name, user in scenario.users.items():
         chains = find_chains(
             mirrors,
             centre[None],
             user.position[None],
-            blocked=meets,
+            blocked=partial(blocked, rays),
+            clearance=rays.clearance,
             max_bounces=scenario.max_bounces,
         )
         for chain in chains:
@@ -109,12 +102,19 @@ def _to_users(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[
             )
 
 
-def _to_receivers(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Iterator[ScenarioPath]:
+def _to_receivers(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[ScenarioPath]:
     station = scenario.base_station
     places = station.element_positions
     senders = station.transmit_positions(places)
     sender = places[0] if senders is None else senders[0]
-    chains = find_chains(mirrors, sender[None], places, blocked=meets, max_bounces=1)
+    chains = find_chains(
+        mirrors,
+        sender[None],
+        places,
+        blocked=partial(blocked, rays),
+        clearance=rays.clearance,
+        max_bounces=1,
+    )
     for chain in chains:
         valid = np.flatnonzero(chain.valid[0])
         if len(chain.vertices[0]) == 0:
@@ -136,20 +136,27 @@ def _to_receivers(scenario: Scenario, mirrors: Mirrors, meets: Blocked) -> Itera
 
 
 def _to_object(
-    scenario: Scenario, surface: Surface, mirrors: Mirrors, meets: Blocked
+    scenario: Scenario, surface: Surface, mirrors: Mirrors, rays: RayScene
 ) -> list[ScenarioPath]:
     centre = _centre(scenario)
     places, outward = _places(surface)
+    if scenario.max_bounces == 0:
+        return []
     chains = find_chains(
         mirrors,
         centre[None],
         places,
-        blocked=meets,
-        max_bounces=scenario.max_bounces,
-        receiver_offsets=_ON_SURFACE * outward,
+        blocked=partial(blocked, rays),
+        clearance=rays.clearance,
+        max_bounces=scenario.max_bounces - 1,
+        receiver_offsets=rays.clearance * outward,
     )
+    # The body is a surface, too, and the echo returns over at least the fewest mirrors.
+    lit = [chain for chain in chains if _lit(chain, outward).any()]
+    fewest = min((len(chain.mirrors) for chain in lit), default=0)
+    lit = [one for one in lit if fewest + 1 + len(one.mirrors) <= scenario.max_bounces]
     shortest = []
-    for chain in chains:
+    for chain in lit:
         seen = _lit(chain, outward)
         if seen.any():
             best = int(np.flatnonzero(seen)[np.argmin(chain.lengths[seen])])

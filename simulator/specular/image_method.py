@@ -12,13 +12,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from simulator.geometry.mirrors import Mirrors, dot
-
-CLEARANCE = 2e-6
-"""How far from its mirror a segment starts when it is tested for occlusion; single precision
-places a point at 1 m within 0.1 µm. [m]"""
+from simulator.geometry.ray_scene import CLEARANCE
 
 ROUGHNESS_CLEARANCE = 6.0
-"""The same on a rough mirror, over its rms height: no crest is higher (1 in 1e9)."""
+"""How much farther off a rough mirror a segment starts, over its rms height: no crest is higher
+(1 in 1e9). [-]"""
 
 ON_PLANE = 1e-9
 """Below this distance a point lies in the mirror's plane, which does not reflect it. [m]"""
@@ -64,6 +62,7 @@ def find_chains(
     receivers: Float[np.ndarray, "receivers 3"],
     *,
     blocked: Blocked,
+    clearance: float = CLEARANCE,
     max_bounces: int = 3,
     min_bounces: int = 0,
     receivers_on: int | None = None,
@@ -79,6 +78,8 @@ def find_chains(
         End points; every source is linked with every receiver. [m]
     blocked
         Occlusion test, called with float64 segments that begin and end just off the mirrors.
+    clearance
+        How far off their mirrors; the test may need more in larger scenes. [m]
     max_bounces, min_bounces
         Bounces of the chains to return; 0 is the line of sight.
     receivers_on
@@ -96,7 +97,7 @@ def find_chains(
         last_is_own = bool(sequence) and sequence[-1] == receivers_on
         if len(sequence) < min_bounces or last_is_own:
             continue
-        chain = _trace(mirrors, sequence, images, sources, receivers, ends, blocked)
+        chain = _trace(mirrors, sequence, images, sources, receivers, ends, blocked, clearance)
         if chain.lengths.size:
             found.append(chain)
     return tuple(sorted(found, key=lambda chain: (len(chain.mirrors), chain.mirrors)))
@@ -109,6 +110,7 @@ def trace_chain(
     receivers: Float[np.ndarray, "receivers 3"],
     *,
     blocked: Blocked,
+    clearance: float = CLEARANCE,
     receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
     paired: bool = False,
 ) -> Chain:
@@ -116,7 +118,7 @@ def trace_chain(
 
     Parameters
     ----------
-    mirrors, sources, receivers, blocked, receiver_offsets
+    mirrors, sources, receivers, blocked, clearance, receiver_offsets
         See :func:`find_chains`.
     sequence
         The mirrors, from the source onward.
@@ -128,7 +130,9 @@ def trace_chain(
     for bounce, mirror in enumerate(sequence):
         images[bounce] = latest = mirrors.images(latest, mirror)
     ends = receivers if receiver_offsets is None else receivers + receiver_offsets
-    return _trace(mirrors, sequence, images, sources, receivers, ends, blocked, paired=paired)
+    return _trace(
+        mirrors, sequence, images, sources, receivers, ends, blocked, clearance, paired=paired
+    )
 
 
 def unfolded_chain(
@@ -237,6 +241,7 @@ def _trace(
     receivers: Float[np.ndarray, "receivers 3"],
     ends: Float[np.ndarray, "receivers 3"],
     blocked: Blocked,
+    clearance: float,
     *,
     paired: bool = False,
 ) -> Chain:
@@ -248,7 +253,7 @@ def _trace(
         kept, vertices = _unfold(mirrors, sequence, images, sources, receivers, source, receiver)
         source, receiver = source[kept], receiver[kept]
         points = [sources[source], *np.moveaxis(vertices, 1, 0), ends[receiver]]
-        clear = _clear(mirrors, sequence, points, blocked)
+        clear = _clear(mirrors, sequence, points, blocked, clearance)
         pairs[some[kept[clear]]] = True
         parts.append(vertices[clear])
     valid = np.diag(pairs) if paired else pairs.reshape(len(sources), len(receivers))
@@ -308,13 +313,14 @@ def _clear(
     sequence: tuple[int, ...],
     points: list[Float[np.ndarray, "paths 3"]],
     blocked: Blocked,
+    clearance: float,
 ) -> Int[np.ndarray, " clear"]:
     """Tell which paths meet nothing between their points."""
     lifted = [points[0]]
     for mirror, before, here in zip(sequence, points[:-1], points[1:], strict=False):
         side = np.sign(mirrors.heights(before, mirror))
-        clearance = CLEARANCE + ROUGHNESS_CLEARANCE * mirrors.rms_heights[mirror]
-        lifted.append(here + clearance * side[:, None] * mirrors.normals[mirror])
+        lift = clearance + ROUGHNESS_CLEARANCE * mirrors.rms_heights[mirror]
+        lifted.append(here + lift * side[:, None] * mirrors.normals[mirror])
     lifted.append(points[-1])
     clear = np.arange(len(points[0]))
     for start, end in pairwise(lifted):

@@ -12,12 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 
+from scenes.schema.errors import ScenarioError
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.beam_culling import LEVEL, AntennaGroup
 from simulator.antennas.links import Links
 from simulator.geometry.mirrors import Mirrors
 from simulator.specular.image_method import unfolded_chain
 from simulator.specular.path_field import reflected_field
+
+MOST_LEGS = 10_000
+"""Most legs over mirrors: each is traced from every antenna, some 10 ms; minutes in all. [-]"""
 
 PAIRS_AT_ONCE = 100_000
 """Links times patches whose reflection is worked out in one go. [-]"""
@@ -78,27 +82,44 @@ def legs_within_reach(
         Antennas; the leg must be in reach of one of them.
     most
         Most mirrors of a leg.
+
+    Returns
+    -------
+    In the order of their mirrors, each leg before those that go on from it.
+
+    Raises
+    ------
+    ScenarioError
+        If there are too many.
     """
     centres = mirrors.corners.mean(axis=1)
     radii = np.linalg.norm(mirrors.corners - centres[:, None], axis=-1).max(axis=1)
 
     def grown(leg: Leg) -> Iterator[Leg]:
-        if leg.bounces == most:
-            return
         for mirror in range(len(mirrors)):
             if leg.sequence and leg.sequence[-1] == mirror:
                 continue
             images = [leg.image(sight) for sight in sights]
             bounds = [i.at_most(centres[mirror : mirror + 1], float(radii[mirror])) for i in images]
-            if max(float(bound[0]) for bound in bounds) < LEVEL or not any(
+            if max(float(bound[0]) for bound in bounds) >= LEVEL and any(
                 _reflects(mirrors, mirror, image) for image in images
             ):
-                continue
-            longer = leg.onward(mirrors, mirror)
-            yield longer
-            yield from grown(longer)
+                yield leg.onward(mirrors, mirror)
 
-    return tuple(grown(DIRECT))
+    found: list[Leg] = []
+    longest = [DIRECT]
+    for bounces in range(1, most + 1):
+        longer: list[Leg] = []
+        for leg in longest:
+            longer += grown(leg)
+            if len(found) + len(longer) > MOST_LEGS:
+                raise ScenarioError(
+                    f"max_bounces = {most}: the antennas reach more than {MOST_LEGS} ways over up "
+                    f"to {bounces} mirrors; set max_bounces = {bounces - 1}, or give the base "
+                    "station a narrower antenna"
+                )
+        found, longest = found + longer, longer
+    return tuple(sorted(found, key=lambda leg: leg.sequence))
 
 
 def _reflects(mirrors: Mirrors, mirror: int, image: AntennaGroup) -> bool:

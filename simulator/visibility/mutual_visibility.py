@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import sionna.rt as rt
 from jaxtyping import Bool
 
 from scenes.schema.errors import ScenarioError
 from simulator.geometry.faces import Face
-from simulator.geometry.ray_scene import CLEARANCE, RAYS_AT_ONCE, blocked
+from simulator.geometry.ray_scene import RAYS_AT_ONCE, RayScene, blocked
 
 MOST_PAIRS = 2**30
 """Most pairs of facets of two surfaces: 1 GiB. [-]"""
@@ -19,7 +18,7 @@ MOST_PAIRS = 2**30
 class MutualVisibility:
     """Tells which facets of two faces see each other; each pair of faces is traced once."""
 
-    scene: rt.Scene
+    rays: RayScene
     faces: Sequence[Face]  # whole
     _traced: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
 
@@ -30,7 +29,7 @@ class MutualVisibility:
             return np.asarray(self._traced[second, first].T[np.ix_(rows, columns)])
         if (first, second) not in self._traced:
             self._traced[first, second] = facets_see_each_other(
-                self.scene, self.faces[first], self.faces[second]
+                self.rays, self.faces[first], self.faces[second]
             )
         return np.asarray(self._traced[first, second][np.ix_(rows, columns)])
 
@@ -44,12 +43,12 @@ class MutualVisibility:
         return index, np.searchsorted(self.faces[index].source, part.source)
 
 
-def facets_see_each_other(scene: rt.Scene, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
+def facets_see_each_other(rays: RayScene, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
     """Trace a ray between each two facets that face each other.
 
     Parameters
     ----------
-    scene
+    rays
         What may stand between them, themselves included.
     one, other
         The two faces.
@@ -71,7 +70,7 @@ def facets_see_each_other(scene: rt.Scene, one: Face, other: Face) -> Bool[np.nd
             "max_bounces = 1"
         )
     seen = np.zeros((one.count, other.count), dtype=bool)
-    starts, ends = (face.centres + CLEARANCE * face.normals for face in (one, other))
+    starts, ends = (face.centres + rays.clearance * face.normals for face in (one, other))
     rows = max(1, RAYS_AT_ONCE // max(other.count, 1))
     for first in range(0, one.count, rows):
         block = slice(first, first + rows)
@@ -79,7 +78,7 @@ def facets_see_each_other(scene: rt.Scene, one: Face, other: Face) -> Bool[np.nd
         leaves = np.einsum("abx,ax->ab", apart, one.normals[block]) > 0
         arrives = np.einsum("abx,bx->ab", apart, other.normals) < 0
         some, others = np.nonzero(leaves & arrives)
-        hidden = blocked(scene, _in_space(starts[block][some]), _in_space(ends[others]))
+        hidden = blocked(rays, _in_space(starts[block][some]), _in_space(ends[others]))
         seen[first + some, others] = ~hidden
     return seen
 

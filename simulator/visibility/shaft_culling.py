@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-import sionna.rt as rt
 from jaxtyping import Bool, Float, Int
 
 from scenes.scenario import Scenario
@@ -22,7 +21,7 @@ from scenes.surfaces.facet_spacing import FEWEST_ROUND
 from simulator.geometry.facets import Facets
 from simulator.geometry.mean_surfaces import mean_surfaces, rms_height
 from simulator.geometry.patches import cut_into_patches
-from simulator.geometry.ray_scene import facets_visible
+from simulator.geometry.ray_scene import RayScene, facets_visible
 from simulator.visibility.seen import Seen
 
 TILE = 0.05
@@ -173,7 +172,7 @@ def _separated(
 class Sightlines:
     """Tells which facets of a scene are seen over links; called with a block of facets."""
 
-    rays: rt.Scene
+    rays: RayScene
     facets: Facets
     senders: Float[np.ndarray, "senders 3"]  # as many as receivers, or a single one [m]
     receivers: Float[np.ndarray, "links 3"]  # [m]

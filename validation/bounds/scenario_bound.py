@@ -67,6 +67,7 @@ def user_waves(scenario: Scenario, user: str, *, weakest_db: float = -60.0) -> U
         sender.positions,
         elements,
         blocked=partial(blocked, rays),
+        clearance=rays.clearance,
         max_bounces=scenario.max_bounces,
     )
     waves = [

@@ -10,7 +10,7 @@ from scipy.special import hankel2
 from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from simulator.geometry.facets import profile_surface
-from simulator.geometry.ray_scene import build_scene
+from simulator.geometry.ray_scene import RayScene, build_scene
 from simulator.specular.free_space import direct_wave
 from simulator.visibility.line_of_sight import in_line_of_sight
 
@@ -31,14 +31,15 @@ def wall(start: tuple[float, float], end: tuple[float, float], name: str = "wall
 
 
 def sionna_paths(
-    scene: rt.Scene, user: Float[np.ndarray, " 3"], *, max_depth: int
+    rays: RayScene, user: Float[np.ndarray, " 3"], *, max_depth: int
 ) -> tuple[Complex[np.ndarray, "elements paths"], Float[np.ndarray, "elements paths"]]:
     """Coefficients at the scene's frequency, and path lengths [m]; NaN where there is none."""
+    scene = rays.scene
     scene.frequency = float(FREQUENCIES[15])
     array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     scene.tx_array = scene.rx_array = array
-    scene.add(rt.Transmitter("source", position=user.tolist()))
-    for index, element in enumerate(ELEMENTS):
+    scene.add(rt.Transmitter("source", position=rays.about_centre(user).tolist()))
+    for index, element in enumerate(rays.about_centre(ELEMENTS)):
         scene.add(rt.Receiver(f"at-{index}", position=element.tolist()))
     paths = rt.PathSolver(deterministic=True)(
         scene,
@@ -117,8 +118,8 @@ def test_looking_twice_and_at_several_users_leaves_the_scene_as_it_was() -> None
     again = [in_line_of_sight(scene, user, ELEMENTS) for user in users]
     np.testing.assert_array_equal(first, again)
     assert not first[1].any()
-    assert not scene.transmitters
-    assert not scene.receivers
+    assert not scene.scene.transmitters
+    assert not scene.scene.receivers
 
 
 def test_a_user_half_a_centimetre_away_is_seen() -> None:

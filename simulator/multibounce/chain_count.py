@@ -1,0 +1,122 @@
+"""Chains of surfaces in two dimensions: which there are, and how much work they make."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from scenes.schema.errors import ScenarioError
+from simulator.geometry.faces import Face
+
+MOST_LINKS = 2**35
+"""Most links between facets over all chains: at a hundred frequencies and some 5 ns each, an hour
+or a few. [-]"""
+
+PORTS_PER_LINK = 32
+"""Antennas whose products take as long as the phase of the link that they share. [-]"""
+
+OUTLINE = 64
+"""Points that stand for a surface where only its directions are asked for. [-]"""
+
+Sees = Callable[[Face, Face], Bool[np.ndarray, "one other"]]
+"""Tells which facets of two faces see each other."""
+
+
+def chains_to(
+    target: int, faces: Sequence[Face], sees: Sees, seen_directly: Sequence[bool], most: int
+) -> Iterator[tuple[int, ...]]:
+    """Find the ways over one to so many faces to another one.
+
+    Parameters
+    ----------
+    target
+        Index of the face that they lead to.
+    faces
+        Sides of the surfaces.
+    sees
+        Their mutual visibility.
+    seen_directly
+        Which faces may come first.
+    most
+        Faces before the target.
+
+    Yields
+    ------
+    Indices of faces, in the order in which they are met, the target left out. No face is
+    followed by one of the same surface.
+    """
+    if most < 1:
+        return
+    for place, face in enumerate(faces):
+        if face.surface == faces[target].surface or not sees(face, faces[target]).any():
+            continue
+        if seen_directly[place]:
+            yield (place,)
+        for chain in chains_to(place, faces, sees, seen_directly, most - 1):
+            yield (*chain, place)
+
+
+def check_chains(faces: Sequence[Face], *, max_bounces: int, elements: int, users: int) -> None:
+    """Refuse chains of more surfaces than can be summed, before anything is.
+
+    Parameters
+    ----------
+    faces
+        Sides of the surfaces.
+    max_bounces
+        Most surfaces of a chain.
+    elements
+        Antennas that echoes are simulated for.
+    users
+        Antennas that send pilots.
+
+    Raises
+    ------
+    ScenarioError
+        If there is too much to be summed; names the most bounces that are possible.
+    """
+    links = _links_of_chains(faces, max_bounces)
+    work = [
+        users * sum(links[: max(0, most - 1)])
+        + (1 + elements / PORTS_PER_LINK) * sum(links[: most // 2])
+        for most in range(max_bounces + 1)
+    ]
+    if not work or work[-1] <= MOST_LINKS:
+        return
+    possible = max(most for most, links_there in enumerate(work) if links_there <= MOST_LINKS)
+    raise ScenarioError(
+        f"max_bounces = {max_bounces}: the chains of up to {max_bounces} surfaces make "
+        f"{work[-1]:.2g} links between facets, more than {MOST_LINKS:.2g}; set max_bounces = "
+        f"{possible}, make surfaces shorter or less finely rough (roughness.correlation_mm), or "
+        "lower radio.stop_ghz"
+    )
+
+
+def _links_of_chains(faces: Sequence[Face], max_bounces: int) -> list[float]:
+    """Count the links between facets in all chains of two, three, … faces that face each other."""
+    pairs = np.array(
+        [[one.count * other.count * _face(one, other) for other in faces] for one in faces],
+        dtype=np.float64,
+    ).reshape(len(faces), len(faces))
+    chains, links, found = np.ones(len(faces)), np.zeros(len(faces)), []
+    for _ in range(2, max_bounces + 1):
+        links = links @ (pairs > 0) + chains @ pairs
+        chains = chains @ (pairs > 0)
+        found.append(float(links.sum()))
+    return found
+
+
+def _face(one: Face, other: Face) -> bool:
+    """Tell whether some of either face lies before some of the other; the surfaces must differ."""
+    return one.surface != other.surface and _before(one, other) and _before(other, one)
+
+
+def _before(face: Face, other: Face) -> bool:
+    some, points = outline(face.centres), outline(other.centres)
+    normals = outline(face.normals)
+    return bool((np.einsum("pfx,fx->pf", points[:, None] - some, normals) > 0).any())
+
+
+def outline(values: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "some 2"]:
+    """Choose at most some :data:`OUTLINE` evenly, of many."""
+    return values[:: max(1, len(values) // OUTLINE)]

@@ -1,0 +1,181 @@
+"""``max_bounces`` from 0 to 8 in a corridor of two metal walls, against all its images."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.constants import speed_of_light
+
+from scenes.scenario import Scenario, ScenarioError, parse_scenario
+from simulator.multibounce import chain_count
+from simulator.scene.scenario_paths import scenario_paths
+from simulator.simulation import Simulation, simulate
+from simulator.specular import image_sources
+
+HALF_WIDTH = 0.25
+USER = (0.04, 2.0)
+RANGE = range(9)
+
+
+def corridor(bounces: int, **tables: Any) -> Scenario:
+    wall = {"kind": "plate", "material": "metal", "angle_deg": 90.0, "length_m": 3.1}
+    return parse_scenario(
+        {
+            "name": "corridor",
+            "max_bounces": bounces,
+            "radio": {"start_ghz": 20.0, "stop_ghz": 20.4, "points": 3},
+            "base_station": {"elements": 2, "spacing_mm": 7.0},
+            "objects": {
+                "left": {**wall, "centre_m": [-HALF_WIDTH, 0.75]},
+                "right": {**wall, "centre_m": [HALF_WIDTH, 0.75]},
+            },
+            "users": {"user": {"position_m": list(USER)}},
+            **tables,
+        }
+    )
+
+
+@cache
+def corridor_up_to(bounces: int) -> Simulation:
+    return simulate(corridor(bounces), seed=0)
+
+
+def uplink(bounces: int) -> np.ndarray:
+    (pilot,) = corridor_up_to(bounces).measurement.uplinks
+    return np.asarray(pilot.samples)
+
+
+def echo(bounces: int) -> np.ndarray:
+    found = corridor_up_to(bounces).measurement.echo
+    scene = corridor(bounces)
+    shape = (scene.base_station.element_count, scene.radio.points)
+    return np.zeros(shape, np.complex128) if found is None else np.asarray(found.samples)
+
+
+def image_lengths(source: np.ndarray, bounces: int) -> list[np.ndarray]:
+    """Ways to both elements from the images that so many mirrorings, left and right, make."""
+    elements = corridor(bounces).base_station.element_positions
+    lengths = []
+    for first in (-1.0, 1.0) if bounces else (1.0,):
+        image = source.copy()
+        for turn in range(bounces):
+            plane = first * (-1) ** turn * HALF_WIDTH
+            image[..., 0] = 2 * plane - image[..., 0]
+        lengths.append(np.linalg.norm(elements - image, axis=-1))
+    return lengths
+
+
+def images(source: np.ndarray, bounces: int) -> np.ndarray:
+    """The field of all images of so many bounces at both elements: conductors turn it round."""
+    wavelengths = speed_of_light / corridor(0).radio.frequencies
+    total = 0.0
+    for length in image_lengths(source, bounces):
+        turns = length[:, None] / wavelengths
+        total = total + (-1) ** bounces * np.exp(-2j * np.pi * turns) / (4 * np.pi * turns)
+    return np.asarray(total)
+
+
+EDGES = 0.06
+"""What the walls' ends and finite distances add, over the images' strength. Ends 0.3 m and more
+off the outermost reflections send back λ/(2π)/0.3 m ≈ 1 % of a field each, both walls at both ends
+and in each of the middle bounces; stationary phase errs by 1/(k·0.25 m) = 1 %. [-]"""
+
+
+@pytest.mark.parametrize("bounces", RANGE[1:])
+def test_each_bounce_adds_its_two_images_to_the_pilot(bounces: int) -> None:
+    expected = images(np.array([*USER, 0.0]), bounces)
+    added = uplink(bounces) - uplink(bounces - 1)
+    strength = 2 / np.mean(image_lengths(np.array([*USER, 0.0]), bounces))
+    assert np.abs(added - expected).max() <= EDGES * strength * speed_of_light / 20e9 / (4 * np.pi)
+
+
+def test_without_bounces_the_pilot_is_the_line_of_sight_and_nothing_returns() -> None:
+    expected = images(np.array([*USER, 0.0]), 0)
+    np.testing.assert_allclose(uplink(0), expected, rtol=1e-9)  # double precision
+    assert corridor_up_to(0).measurement.echo is None
+
+
+@pytest.mark.parametrize("bounces", RANGE[1:])
+def test_each_bounce_adds_its_two_images_to_the_echo(bounces: int) -> None:
+    elements = corridor(0).base_station.element_positions
+    expected = images(elements, bounces)
+    added = echo(bounces) - echo(bounces - 1)
+    strength = 2 / np.mean(image_lengths(elements, bounces))
+    assert np.abs(added - expected).max() <= EDGES * strength * speed_of_light / 20e9 / (4 * np.pi)
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 2, 3, 8])
+def test_the_paths_are_the_images(bounces: int) -> None:
+    found = [path for path in scenario_paths(corridor(bounces)) if path.kind == "user"]
+    assert [path.bounces for path in found] == [0] + [
+        n for n in range(1, bounces + 1) for _ in "ab"
+    ]
+    station = corridor(bounces).base_station
+    for path in found:
+        elements = image_lengths(np.array([*USER, 0.0]), path.bounces)
+        near = [np.abs(length - path.length).min() for length in elements]
+        # From the middle of the array: half the spacing times the sine of 65° off.
+        assert min(near) <= np.linalg.norm(station.element_positions[0])
+
+
+POST = {"kind": "cylinder", "material": "metal", "centre_m": [0.1, 1.0], "radius_m": 0.01}
+
+
+@pytest.mark.parametrize(("bounces", "mirrors"), [(0, []), (1, [0]), (2, [0, 1, 1])])
+def test_a_body_in_the_paths_is_a_bounce_of_the_echo(bounces: int, mirrors: list[int]) -> None:
+    scene = corridor(bounces)
+    scene = corridor(bounces, objects={**dumped(scene), "post": POST})
+    found = [path.bounces for path in scenario_paths(scene) if path.kind == "object"]
+    assert found == mirrors
+
+
+def dumped(scene: Scenario) -> dict[str, Any]:
+    return {name: body.model_dump(exclude_defaults=True) for name, body in scene.objects.items()}
+
+
+def test_points_are_no_surfaces_and_return_without_a_bounce() -> None:
+    points = {"point": {"position_m": [0.1, 1.0], "rcs_dbsm": -30.0}}
+    one, none = (
+        simulate(corridor(0, points=points, **more), seed=0).measurement.echo
+        for more in ({}, {"objects": {}})
+    )
+    assert one is not None
+    assert none is not None
+    np.testing.assert_array_equal(one.samples, none.samples)
+
+
+def test_more_chains_than_can_be_summed_are_refused_with_what_is_possible(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(chain_count, "MOST_LINKS", 3e7)
+    with pytest.raises(
+        ScenarioError,
+        match=r"max_bounces = 8: .* links .* more than 3e\+07; set max_bounces = \d, ",
+    ):
+        simulate(corridor(8), seed=0)
+
+
+def test_more_ways_over_mirrors_in_space_than_can_be_traced_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(image_sources, "MOST_LEGS", 5)
+    wall = {"kind": "plate", "material": "metal", "angle_deg": 90.0, "length_m": 0.2,
+            "height_m": 0.2}  # fmt: skip
+    scene = parse_scenario(
+        {
+            "name": "corridor",
+            "dimensions": 3,
+            "max_bounces": 8,
+            "radio": {"start_ghz": 20.0, "stop_ghz": 20.4, "points": 3},
+            "base_station": {"elements": 2, "spacing_mm": 7.0},
+            "objects": {
+                "left": {**wall, "centre_m": [-0.1, 0.2, 0.0]},
+                "right": {**wall, "centre_m": [0.1, 0.2, 0.0]},
+            },
+            "users": {"user": {"position_m": [0.04, 0.3, 0.0]}},
+        }
+    )
+    # Two ways with each number of mirrors: four up to two.
+    with pytest.raises(ScenarioError, match=r"max_bounces = 8: .* 5 ways .* set max_bounces = 2"):
+        simulate(scene, seed=0)
