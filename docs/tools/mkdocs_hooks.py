@@ -1,7 +1,8 @@
 """What MkDocs is told besides its configuration: equations as MathML, and pages that are made.
 
-The reference of the command line is made from the commands. The page of results is made by
-``mmslam validate --record docs/results``; until then a page in its place says so.
+The reference of the command line is made from the commands, the notebooks' pages by executing them.
+The page of results is made by ``mmslam validate --record docs/results``; until then a page in its
+place says so.
 """
 
 import re
@@ -17,6 +18,7 @@ from markdown.preprocessors import Preprocessor
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
+from notebooks import NOTEBOOKS, executed, notebook_page
 
 NO_RESULTS = """# Results
 
@@ -29,6 +31,9 @@ mmslam validate --record docs/results
 which checks every claim and writes its figures and pictures here (see
 [validation](../how_to/validate.md)).
 """
+
+
+_pages: dict[bytes, str] = {}  # of notebooks by their content: `mkdocs serve` builds often
 
 
 class _Blocks(Preprocessor):
@@ -84,6 +89,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     made = {"reference/command_line.md": command_line_page(app)}
     if not (Path(config.docs_dir) / "results" / "index.md").exists():
         made["results/index.md"] = NO_RESULTS
+    for notebook in sorted(NOTEBOOKS.glob("*.ipynb")):
+        content = notebook.read_bytes()
+        if content not in _pages:
+            _pages[content] = notebook_page(executed(notebook), notebook.name)
+        made[f"notebooks/{notebook.stem}.md"] = _pages[content]
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
     return files

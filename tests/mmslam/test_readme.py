@@ -1,15 +1,19 @@
 import re
 from pathlib import Path
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import mmslam
 from estimator.measurement.store import read_measurement
 from mmslam.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
+PYTHON = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
 def test_the_two_commands_stand_as_promised() -> None:
@@ -17,10 +21,27 @@ def test_the_two_commands_stand_as_promised() -> None:
     assert "\npip install uv && uv run pytest\n" in README
 
 
+def test_the_five_lines_run_as_printed() -> None:
+    assert len(PYTHON[0].splitlines()) == 5
+    names: dict[str, Any] = {}
+    exec(PYTHON[0], names)
+    user = names["estimate"].users["user"]
+    assert user.status == "found"
+    truth = names["measurement"].truth.user_position["user"]
+    assert np.linalg.norm(user.position - truth) < 1e-3  # what slam_2d promises of every seed
+    plt.close("all")
+
+
+def test_every_name_in_python_that_the_readme_tells_exists() -> None:
+    told = README.split("In Python they are")[1].split("The commands call")[0]
+    for name in re.findall(r"`(?:mmslam\.)?(\w+)`", told):
+        assert name in mmslam.__all__
+
+
 def test_the_readmes_way_to_write_a_measurement_is_read_by_locate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    code = PYTHON[1]
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(3)
     samples = rng.normal(size=(4, 5)) + 1j * rng.normal(size=(4, 5))
@@ -47,7 +68,7 @@ def test_every_command_and_option_that_the_readme_names_exists() -> None:
     helps = " ".join(CliRunner().invoke(app, [name, "--help"]).stdout for name in commands)
     helps += CliRunner().invoke(app, ["--help"]).stdout
     plain = re.sub(r"\x1b\[[0-9;]*m", "", helps)  # colours split the names of options
-    commands_section = README.split("## Commands")[1].split("## Your own data")[0]
+    commands_section = README.split("## Commands, and")[1].split("## Your own data")[0]
     for option in sorted(set(re.findall(r"--[a-z]+", commands_section))):
         assert option in plain, option
 
