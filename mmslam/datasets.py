@@ -88,7 +88,7 @@ class Dataset:
         for name in ("echo", "uplink"):
             if name in self._root:
                 sizes = self._root[name].sizes
-                rows.append((name, ", ".join(f"{size} {key}s" for key, size in sizes.items())))
+                rows.append((name, ", ".join(f"{key} {size}" for key, size in sizes.items())))
         return Table(title=str(self.path), rows=rows)
 
 

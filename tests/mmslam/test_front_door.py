@@ -176,7 +176,9 @@ def test_the_truth_is_drawn_where_it_is(
 ) -> None:
     def rings(truth: Truth | None) -> list[np.ndarray]:
         lines = estimate.plot(truth=truth).lines
-        return [np.asarray(line.get_xydata()) for line in lines if line.get_mfc() == "none"]
+        return [
+            np.asarray(line.get_xydata()) for line in lines if line.get_markerfacecolor() == "none"
+        ]
 
     place = measurement.truth.user_position["user"][:2]
     assert any(len(ring) == 1 and np.allclose(ring[0], place) for ring in rings(measurement.truth))
