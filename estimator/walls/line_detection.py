@@ -14,8 +14,8 @@ from estimator.array.resolution_cell import Resolution
 from estimator.imaging.peak_detection import MOST_PEAKS
 
 FEWEST_INLIERS = 5
-"""Peaks that make a line. Of n ≤ 400 peaks thrown at random over an area of hundreds of cells
-across, some line through two of them meets 6 more with a probability below 1e-3."""
+"""Peaks that make a line, without a :data:`GAP`. Of 400 peaks strewn over an image of 128 elements
+and 75 GHz no five made one in 6 images, but four made two in three of these. [-]"""
 
 TOLERANCE = 0.5
 """Distance across a line within which a peak is on it: a pixel of the survey is 0.49 cells. [cells]

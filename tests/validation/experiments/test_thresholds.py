@@ -1,0 +1,87 @@
+"""The estimator's thresholds do what they say, on few draws; the full tables have many."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from estimator.walls import line_relations
+from validation.experiments.thresholds import SCANS, Scan, overlap_rows, scan, scan_row, wall_rows
+from validation.trials import chance_finds
+from validation.trials.drawn_echoes import draw_echo
+from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
+
+
+def test_noise_passes_the_threshold_of_a_rate_as_often_as_the_rate_says() -> None:
+    row = chance_finds.highest_of_cells(np.random.default_rng(0), trials=2000)
+    assert row.passed, row.value
+
+
+def test_strewn_peaks_make_no_lines_and_no_planes() -> None:
+    rng = np.random.default_rng(1)
+    assert chance_finds.strewn_lines(rng, peaks=100, images=2).passed
+    assert chance_finds.strewn_planes(rng, volumes=3).passed
+
+
+def test_speckle_has_no_gaps_as_wide_as_those_that_end_a_wall() -> None:
+    for row in chance_finds.speckle_gap(np.random.default_rng(2), cells=20_000):
+        assert row.passed, row.value
+
+
+def test_speckle_and_smoothed_background_are_as_dark_and_as_bright_as_stated() -> None:
+    rng = np.random.default_rng(3)
+    rows = [*chance_finds.speckle_levels(rng), chance_finds.smoothed_background(rng, pixels=500)]
+    for row in rows:
+        assert row.passed, f"{row.name}: {row.value}"
+
+
+def test_a_rough_wall_is_found_and_lies_within_what_thresholds_allow() -> None:
+    echoes = surveyed(["wall"], 0)
+    for row in wall_rows("one wall", [wall_statistics(one) for one in echoes]):
+        assert row.passed, f"{row.name}: {row.value}"
+    for row in overlap_rows(echoes, draws=50):
+        assert row.passed, f"{row.name}: {row.value}"
+
+
+def test_noise_shows_no_wall() -> None:
+    result = detection(surveyed(["noise"], 0))
+    assert (result.walls, result.false) == (0, 0)
+
+
+def test_a_wall_whose_contrast_is_not_enough_is_not_found() -> None:
+    """The scan of a constant changes what the detection does, and changes it back."""
+    echoes = surveyed(["wall"], 0)
+    with changed("estimator.walls.wall_detection_2d", "LEAST_CONTRAST", 1e9):
+        assert detection(echoes).found == 0
+    assert detection(echoes).found == 1
+
+
+def test_a_constant_is_changed_wherever_it_is_imported() -> None:
+    user = importlib.import_module("estimator.walls.line_refinement")
+    own = line_relations.BEYOND_END
+    with changed("estimator.walls.line_relations", "BEYOND_END", 2.5):
+        assert vars(user)["BEYOND_END"] == 2.5
+    assert vars(user)["BEYOND_END"] == own
+
+
+@pytest.mark.parametrize("one", SCANS, ids=lambda one: one.name)
+def test_each_scan_is_of_a_constant_that_exists_between_the_values_tried(one: Scan) -> None:
+    low, high = one.values
+    module = importlib.import_module(one.module)
+    own = getattr(module, one.name)
+    assert low < own < high
+
+
+@pytest.mark.slow
+def test_no_neighbouring_value_of_a_constant_finds_more_walls() -> None:
+    echoes = surveyed(["wall", "corner", "posts", "noise"], 3)
+    for one in SCANS:
+        row = scan_row(one, scan(one, echoes))
+        assert row.passed, f"{row.name}: {row.value}"
+
+
+def test_corners_are_drawn_with_both_walls_in_sight() -> None:
+    for seed in range(5):
+        walls = draw_echo("corner", np.random.default_rng(seed)).walls
+        spans = [sorted(end[0] / end[1] for end in wall) for wall in walls]
+        assert min(spans[0][1], spans[1][1]) <= max(spans[0][0], spans[1][0]) + 1e-9

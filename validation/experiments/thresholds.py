@@ -1,0 +1,228 @@
+"""What the estimator's thresholds do, measured on draws of noise, speckle, and rough walls.
+
+Run as ``python -m validation.experiments.thresholds [chance|walls|scans] [DRAWS]``.
+
+Not in the thesis, whose walls are marked by hand. Three tables:
+
+- ``chance``: what noise and strewn peaks do to the false-alarm rates and to the searches
+  (:mod:`validation.trials.chance_finds`);
+- ``walls``: what true walls show of what thresholds bound, in closed form and simulated
+  (:mod:`validation.trials.wall_statistics`);
+- ``scans``: walls found, false walls, and the error of the walls' angle, as one constant at a time
+  is changed to the values beside its own. A constant whose neighbours give the same needs no finer
+  choice; where one loses walls or makes false ones, that is its reason.
+
+Claims that are asserted: each threshold does what its docstring says, within the limits in the
+table; and no scan's own value finds fewer walls, or more false ones, than a value beside it.
+"""
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.walls import line_refinement, line_relations, wall_detection_2d
+from validation.harness.claim import Row
+from validation.harness.row_table import conclude
+from validation.trials.chance_finds import chance_rows
+from validation.trials.drawn_echoes import Kind
+from validation.trials.wall_statistics import (
+    WALLS,
+    Detection,
+    Surveyed,
+    WallStatistics,
+    changed,
+    crossing_overlap,
+    detection,
+    followed_overlap,
+    simulated_wall,
+    surveyed,
+    wall_statistics,
+)
+
+DRAWS = 12
+"""Walls of each family. [-]"""
+SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
+"""Echoes on which constants are scanned, besides one simulated wall of each family. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scan:
+    """A constant, and the values beside its own."""
+
+    module: str
+    name: str
+    values: tuple[float, float]
+
+
+SCANS = (
+    Scan(module="estimator.imaging.survey_2d", name="MOST_GAIN", values=(1.1, 1.5)),
+    Scan(module="estimator.imaging.peak_detection", name="DYNAMIC_RANGE", values=(1e-5, 1e-4)),
+    Scan(module="estimator.walls.line_detection", name="FEWEST_INLIERS", values=(4.0, 7.0)),
+    Scan(module="estimator.walls.line_detection", name="TOLERANCE", values=(0.35, 0.75)),
+    Scan(module="estimator.walls.line_detection", name="LEAST_APART", values=(2.0, 5.0)),
+    Scan(module="estimator.walls.line_detection", name="GAP", values=(4.0, 10.0)),
+    Scan(module="estimator.walls.line_sampling", name="CELLS_CUT", values=(1.0, 3.0)),
+    Scan(module="estimator.walls.line_extent", name="LEAST_LIT", values=(0.1, 0.5)),
+    Scan(module="estimator.walls.line_extent", name="END_LEVEL", values=(0.03, 0.2)),
+    Scan(module="estimator.walls.line_fit_image", name="SUMMIT", values=(0.4, 0.8)),
+    Scan(module="estimator.walls.line_fit_image", name="LEAST_RISE", values=(0.9, 1.0)),
+    Scan(module="estimator.walls.line_fit_echo", name="OVERSAMPLING", values=(1.0, 1.5)),
+    Scan(module="estimator.walls.line_refinement", name="CUT_SHARE", values=(0.1, 0.6)),
+    Scan(module="estimator.walls.line_relations", name="BESIDE", values=(1.5, 3.0)),
+    Scan(module="estimator.walls.line_relations", name="BEYOND_END", values=(2.0, 8.0)),
+    Scan(module="estimator.walls.line_relations", name="GOOD_PART", values=(0.2, 0.6)),
+    Scan(module="estimator.walls.wall_detection_2d", name="MOST_UNCERTAIN", values=(0.25, 1.0)),
+    Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CONTRAST", values=(5.0, 20.0)),
+    Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CELLS", values=(6.0, 12.0)),
+    Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
+)
+
+
+def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
+    """Compare what the walls of one family show with the thresholds that bound it.
+
+    Parameters
+    ----------
+    name
+        Of the family.
+    walls
+        Its draws.
+    """
+
+    def column(key: str) -> np.ndarray:
+        values = np.array([getattr(one, key) for one in walls], dtype=np.float64)
+        return np.asarray(values[np.isfinite(values)])
+
+    def row(
+        constant: str,
+        stated: str,
+        measured: float,
+        *,
+        low: float | None = None,
+        high: float | None = None,
+    ) -> Row:
+        return Row(
+            name=f"{constant} ({name})",
+            stated=stated,
+            measured=measured,
+            low=low,
+            high=high,
+            origin="the constant",
+        )
+
+    found = column("turn").size / len(walls)
+    if found == 0:
+        return [row("walls found", "all but one in ten", 0.0, low=0.9)]
+    return [
+        row("walls found", "all but one in ten", found, low=0.9),
+        row("line_relations.BESIDE: 99 % of a wall's peaks, median", "cells",
+            float(np.median(column("beside"))), high=line_relations.BESIDE),
+        row("line_relations.BEYOND_END: farthest peak, the worst", "cells",
+            float(column("beyond_end").max()), high=line_relations.BEYOND_END),
+        row("wall_detection_2d.MOST_BENT: bent peaks, the worst", "share",
+            float(column("bent").max()), high=wall_detection_2d.MOST_BENT),
+        row("wall_detection_2d.WALL_COHERENCE: median over a wall, the worst", "coherence",
+            float(column("coherence").min()), low=wall_detection_2d.WALL_COHERENCE),
+        row("wall_detection_2d.LEAST_CONTRAST: the least", "level over background",
+            float(column("contrast").min()), low=wall_detection_2d.LEAST_CONTRAST),
+        row("wall_detection_2d.MOST_UNCERTAIN: deviation, the worst", "cells",
+            float(column("deviation").max()), high=wall_detection_2d.MOST_UNCERTAIN),
+        row("line_refinement.EXPLAINED: by the row, the least", "share",
+            float(column("explained").min()), low=line_refinement.EXPLAINED),
+        row("line_refinement.DISAGREEMENT: of image and echo, median", "over covariances",
+            float(np.median(column("disagreement"))), high=line_refinement.DISAGREEMENT),
+        row("line_fit_image.TILT_SHARE: mean square over what modes let expect", "0.45 to 2.1",
+            float(column("tilt_share").mean()), high=2.1 * (1 + 4 / np.sqrt(len(walls)))),
+        row("line_fit_image.OFFSET_SHARE: the same of the offset", "0.5 to 1.3",
+            float(column("offset_share").mean()), high=1.3 * (1 + 4 / np.sqrt(len(walls)))),
+    ]  # fmt: skip
+
+
+def overlap_rows(echoes: tuple[Surveyed, ...], *, draws: int = 400) -> list[Row]:
+    """Compare the overlap of crossing walls, and of two fits of one wall, with what tells them."""
+    crossing = crossing_overlap(np.random.default_rng(0), draws=draws)
+    one_wall = [followed_overlap(one) for one in echoes if one.drawn.kind == "wall"]
+    return [
+        Row(
+            name="line_relations.GOOD_PART: share of a wall on one that crosses it, the largest",
+            stated="walls that cross share the cells of the crossing",
+            measured=float(crossing.max()),
+            high=line_relations.GOOD_PART,
+            origin="the constant",
+        ),
+        Row(
+            name="line_relations.GOOD_PART: share of a wall on another fit of it, the least",
+            stated="both are followed to the wall's ends",
+            measured=float(np.nanmin(one_wall)),
+            low=line_relations.GOOD_PART,
+            origin="the constant",
+        ),
+    ]
+
+
+def scan(one: Scan, echoes: tuple[Surveyed, ...]) -> dict[float, Detection]:
+    """Detect the walls of echoes with a constant's own value and with those beside it."""
+    own = getattr(sys.modules[one.module], one.name)
+    results = {}
+    for value in sorted({own, *one.values}):
+        with changed(one.module, one.name, type(own)(value)):
+            results[value] = detection(echoes)
+    return results
+
+
+def scan_line(one: Scan, results: dict[float, Detection]) -> str:
+    """Describe a scan in a line; the constant's own value is in brackets."""
+    own = getattr(sys.modules[one.module], one.name)
+    parts = []
+    for value, result in results.items():
+        label = f"[{value:g}]" if value == own else f"{value:g}"
+        parts.append(
+            f"{label}: {result.found}/{result.walls} walls, {result.false} false, "
+            f"{np.degrees(result.median_turn):.4f}°"
+        )
+    return f"{one.module.removeprefix('estimator.')}.{one.name}: " + "; ".join(parts)
+
+
+def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
+    """Tell by how many walls the constant's own value falls behind the best one beside it."""
+    own = getattr(sys.modules[one.module], one.name)
+    merit = {value: result.found - result.false for value, result in results.items()}
+    return Row(
+        name=f"{one.module.removeprefix('estimator.')}.{one.name}: true less false walls, behind",
+        stated="none of its neighbours does better by more than one wall",
+        measured=max(merit.values()) - merit[own],
+        high=1.0,
+        origin="one wall of the draws: the scatter of a count",
+    )
+
+
+def main(arguments: list[str]) -> None:
+    """Print the tables that are asked for; fail where a threshold does not do what it says."""
+    wanted = [one for one in arguments if not one.isdigit()] or ["chance", "walls", "scans"]
+    draws = next((int(one) for one in arguments if one.isdigit()), DRAWS)
+    rows: list[Row] = []
+    if "chance" in wanted:
+        rows += chance_rows(np.random.default_rng(0))
+    if "walls" in wanted:
+        closed = surveyed(["wall"] * draws, 0)
+        rows += overlap_rows(closed)
+        rows += wall_rows("closed form", [wall_statistics(one) for one in closed])
+        for name, overrides in WALLS.items():
+            rows += wall_rows(
+                name,
+                [wall_statistics(simulated_wall(overrides, seed)) for seed in range(draws)],
+            )
+            print(f"measured: {name}", file=sys.stderr, flush=True)
+    if "scans" in wanted:
+        echoes = surveyed(SCENES, 1)
+        echoes += tuple(simulated_wall(overrides, 100) for overrides in WALLS.values())
+        for one in SCANS:
+            results = scan(one, echoes)
+            print(scan_line(one, results), flush=True)
+            rows.append(scan_row(one, results))
+    conclude(rows)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
