@@ -304,10 +304,23 @@ def test_modules_and_files_that_commands_name_exist() -> None:
             assert (CHECKOUT / word).exists(), f"{page}: {word}"
 
 
-def test_modules_of_the_reference_exist() -> None:
-    for page, text in PAGES.items():
-        for name in re.findall(r"^::: ([\w.]+)$", text, flags=re.MULTILINE):
-            assert (CHECKOUT / (name.replace(".", "/") + ".py")).is_file(), f"{page}: {name}"
+@pytest.mark.parametrize("package", ["scenes", "simulator", "estimator"])
+def test_the_reference_holds_every_module_under_its_sub_package(package: str) -> None:
+    page = (DOCS / "reference" / f"{package}.md").read_text("utf-8")
+    text = tool("module_reference")["with_modules"](page, CHECKOUT)
+    named = re.findall(r"^::: ([\w.]+)$", text, flags=re.MULTILINE)
+    for name in named:
+        assert (CHECKOUT / (name.replace(".", "/") + ".py")).is_file(), name
+    modules = {
+        ".".join(file.relative_to(CHECKOUT).with_suffix("").parts)
+        for file in (CHECKOUT / package).rglob("*.py")
+        if not file.stem.startswith("_")
+    }
+    assert set(named) == modules
+    for name in modules:
+        *folder, _ = name.split(".")
+        section = text.split(f"## `{'.'.join(folder)}`")[-1].split("\n## ")[0]
+        assert len(folder) == 1 or f"::: {name}\n" in section
 
 
 def tool(name: str) -> dict[str, Any]:

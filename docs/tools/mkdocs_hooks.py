@@ -1,8 +1,8 @@
 """What MkDocs is told besides its configuration: equations as MathML, and pages that are made.
 
-The reference of the command line is made from the commands, the notebooks' pages by executing them.
-The page of results is made by ``mmslam validate --record docs/results``; until then a page in its
-place says so.
+The reference of the command line is made from the commands, that of the packages from their
+sub-packages, the notebooks' pages by executing them. The page of results is made by
+``mmslam validate --record docs/results``; until then a page in its place says so.
 """
 
 import re
@@ -18,6 +18,8 @@ from markdown.preprocessors import Preprocessor
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from module_reference import with_modules
 from notebooks import NOTEBOOKS, executed, notebook_page
 
 NO_RESULTS = """# Results
@@ -97,3 +99,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Put the modules of a package where its page has their marker."""
+    return with_modules(markdown, Path(config.config_file_path).parent)
