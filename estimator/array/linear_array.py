@@ -1,4 +1,4 @@
-"""What a linear array resolves, and between which ranges and angles it images."""
+"""A linear array's resolution cell, and the ranges and angles that it images unambiguously."""
 
 import numpy as np
 from scipy.constants import speed_of_light

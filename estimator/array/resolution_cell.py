@@ -1,4 +1,4 @@
-"""The resolution cell of an aperture: fine along the ray, coarse across it."""
+"""The resolution cell of an aperture: c/2B along the ray, λ/2D times the range across it."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from estimator.array.windows import SURVEY_TAPER
 
 @dataclass(frozen=True, kw_only=True)
 class Resolution:
-    """Resolution of an aperture at a point: fine along the ray, coarse across it."""
+    """Resolution of an aperture, along and across the ray from its centre."""
 
     along_ray: float  # [m]
     across_ray: float  # per metre of range: an angle [rad]
@@ -28,6 +28,12 @@ class Resolution:
 
 
 def coarse_resolution(fine: Resolution) -> Resolution:
-    """Return the resolution of the survey, which its taper widens."""
+    """Return the resolution of the survey, which its taper widens by 1.54.
+
+    Parameters
+    ----------
+    fine
+        Of the untapered echo.
+    """
     wider = SURVEY_TAPER.half_power_width / HALF_POWER
     return Resolution(along_ray=wider * fine.along_ray, across_ray=wider * fine.across_ray)

@@ -174,7 +174,7 @@ def _in_array_frame(
 def _strongest(
     residual: Uplink, angles: Float[np.ndarray, " angles"], lengths: Float[np.ndarray, " ranges"]
 ) -> tuple[float, WaveStart]:
-    """Return the highest power over the mean of noise, and where it is."""
+    """Return the highest power of the residual's map over the mean of noise, and where it is."""
     chart = angle_range_map(residual, aoa=angles, path_length=lengths, centre=np.zeros(3))
     power = np.abs(chart.values) ** 2
     noise = mean_background(power)

@@ -1,4 +1,4 @@
-"""An image as a function of points."""
+"""An image as a function of points: the echo is focused wherever it is asked for."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,15 @@ Focus = Callable[[Float[np.ndarray, "*grid 3"]], Complex[np.ndarray, "*grid"]]
 
 
 def focus_within(focuser: Focuser, farthest: float) -> Focus:
-    """Return a function that focuses on points; beyond what is unambiguous there is 0."""
+    """Return a function that focuses an echo on points of any grid.
+
+    Parameters
+    ----------
+    focuser
+        The prepared echo, in the array's frame.
+    farthest
+        Distance up to which ranges are unambiguous; the image is 0 beyond. [m]
+    """
 
     def focused(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
         inside = np.einsum("...x,...x->...", points, points) < farthest**2

@@ -1,18 +1,18 @@
-r"""The curvature of an echo's wavefront tells what is seen from what is scattered twice.
+r"""The phase curvature of an echo over the aperture: single scattering against double scattering.
 
-What the array sees, straight or over flat mirrors, comes from one point: the round trip to it
-is twice its distance from each antenna. A wave that a rough wall scatters on its way to a
-target, and that returns over the mirror itself, has the length
+A thing that is seen directly or over flat mirrors has a wavefront centred on one point: the round
+trip is twice the distance of that point (its image) from each antenna. A wave that a rough wall
+scatters on its way to a target, and that returns over the wall as a mirror, has the length
 
 .. math:: \lVert q - f \rVert + \lVert f - t \rVert + \lVert t - q \rVert
 
 over the antennas q, with the facet f and the target's image t. It appears half-way between their
 directions, with the curvature :math:`\tfrac12(1/\lVert f \rVert + 1/\lVert t \rVert)`: more
-than that of a point where it appears, as the facet is nearer. Scattered both ways, it has
-:math:`1/\lVert f \rVert`; so has every echo whose last scatterer lies before the end of its
-path. A bend that the aperture resolves tells the cloud of diffuse echoes around a ghost from
-the ghost, one speckle at a time. Less curvature than a point's is that of something smooth and
-flat or round, which is seen.
+than that of a point where it appears, as the facet is nearer. Scattered by the wall both ways, it
+has :math:`1/\lVert f \rVert`; so has every echo whose last scatterer lies before the end of its
+path. An excess curvature that the aperture resolves distinguishes the diffuse multipath around a
+ghost from the ghost, for each peak of the speckle. Less curvature than a point's comes from a
+smooth flat or convex surface, which is seen directly.
 """
 
 import numpy as np
@@ -23,19 +23,22 @@ from estimator.array.resolution_cell import Resolution
 from estimator.imaging.range_compression import RangeProfiles
 
 BENDS = np.linspace(0.0, 24.0, 13)
-"""Excess phases at the ends of the aperture that are tried. [rad]."""
+"""Excess phases at the ends of the aperture that are tried. Steps of 2 rad lose 9 % of a focus'
+intensity at most; for 260 elements of 0.5 mm a ghost at 0.5 m and a facet at half of that differ by
+23 rad. [rad]"""
 SHIFTS = np.linspace(-0.75, 0.75, 7)
-"""Directions that are tried, about the peak's. [cells λ/2D]."""
+"""Directions that are tried, about the peak's, whose pixel is 0.75 cells wide. [cells λ/2D]"""
 TILTS = np.linspace(-2.0, 2.0, 9)
-"""Directions of a reflection without curvature that are tried, about the peak's. [cells λ/2D]."""
+"""Directions of a reflection without curvature that are tried, about the peak's: such a reflection
+is as wide as the array, and its peaks lie beside its direction. [cells λ/2D]"""
 RANGE_SHIFTS = np.linspace(-0.5, 0.5, 3)
-"""Ranges that are tried, about the peak's. [cells c/2B]."""
+"""Ranges that are tried, about the peak's, whose pixel is 0.75 cells wide. [cells c/2B]"""
 
 
 def bent_intensities(
     profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], resolution: Resolution
 ) -> Float[np.ndarray, "points bends"]:
-    """Focus points with ever more curved wavefronts, each at its best place within a cell.
+    """Focus points with wavefronts of increasing curvature, each at its best place within a cell.
 
     Parameters
     ----------
@@ -73,13 +76,13 @@ def coherence_factor(
     flat: bool,
     noise: float,
 ) -> Float[np.ndarray, " points"]:
-    r"""Return which share of the energy at some places is one wave over the whole aperture.
+    r"""Return the coherence factor of an echo at some places.
 
     .. math:: \frac{|\sum_m z_m|^2}{M \sum_m |z_m|^2}
 
-    of the M channels' profiles :math:`z_m` at the range to a place: one for a single point,
-    the share of the aperture for what only a part of it sees, 1/M for speckle and sidelobes
-    from elsewhere at the same range.
+    of the M channels' profiles :math:`z_m` at the range to a place: the share of the energy that is
+    one wave over the whole aperture. It is 1 for a single point, the share of the aperture for
+    what only a part of it sees, 1/M for speckle and sidelobes from elsewhere at the same range.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fewer frequencies for what lies near one length: gating and decimation in one step."""
+"""Range gating: echoes or paths near one length, at as many frequencies as these need."""
 
 from dataclasses import replace
 from typing import TypeVar
@@ -20,8 +20,8 @@ FEWEST_BLOCKS = 8
 def gated(measured: Measured, path_length: float, *, reach: float) -> Measured:
     """Keep what arrives near one length, and only as many frequencies as that needs.
 
-    Hann-weighted blocks of neighbouring frequencies, each averaged after the phase of
-    ``path_length`` was taken out and put back after: what is farther than ``reach`` away is
+    Blocks of neighbouring frequencies are averaged with Hann weights after the phase of
+    ``path_length`` was removed; it is restored afterwards. What is farther than ``reach`` away is
     attenuated, and what is near keeps its phase.
 
     Parameters

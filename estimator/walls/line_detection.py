@@ -1,8 +1,9 @@
 """Straight lines among the peaks of a SAR image: a first guess of the mirrors.
 
-A rough wall shows as speckle: one peak for each resolution cell or two along it, of random
-strength. Every peak therefore counts the same here, however bright; a consensus over pairs
-of peaks then finds lines that a few bright facets, edges or point targets cannot feign.
+A rough wall shows as speckle: one peak for each resolution cell or two along it (1.8 are measured),
+of random strength. Every peak therefore counts the same here, however bright; a consensus over
+pairs of peaks (as in RANSAC, but over all pairs) then finds lines that a few bright facets, edges
+or point targets cannot imitate.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
-"""How far a wall goes along its line: to the last bright cells, and there to the highest step.
+"""The ends of a wall along its line: the highest step of the level near its last bright cells.
 
-A flat face that is seen over a mirror ends where its own level does. Only the ends of the array
-see the ends of a flat face reflect: a taper over the array, which takes the sidelobes off a wall's
-ends, dims those of a face until they are no brighter than the shoulder of what is scattered twice
-beside them. Without the taper a face is as bright at its ends as in its middle.
+A flat face that is seen over a mirror ends where its own level ends. Only the outer elements of the
+array receive the specular reflection of the face's ends: a taper over the array, which suppresses
+the sidelobes of a wall's ends, attenuates them down to the level of the diffuse multipath beside
+them. Without the taper a face is as bright at its ends as in its middle.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-r"""A wall's line from the phases of its whole echo, whatever its speckle is.
+r"""A wall's line from its whole echo: least squares over a row of unknown scatterers.
 
 A straight rough wall is a row of scatterers of unknown strengths :math:`\gamma_i`, so its echo,
 as range profiles of each antenna position, is
@@ -6,15 +6,15 @@ as range profiles of each antenna position, is
 .. math:: d = A(\alpha, \rho)\, \gamma + \text{rest}, \qquad
           A_{(m,b),i} = D(r_b - r_{mi})\, e^{-j 4 \pi f_c r_{mi} / c}
 
-with Dirichlet's kernel D of the sweep. Scatterers finer than a resolution cell can give any
-speckle, and still only a small part of all possible data: a line that is turned or moved by a
-fraction of a cell cannot explain the echo. The least squares over strengths, angle and offset
-together (variable projection, in Kaufman's approximation [1]_) are free of what moves the
-brightest line of an image: each cell's speckle in its neighbours' sidelobes, levels that change
-along the wall, and its ends.
+with Dirichlet's kernel D of the sweep. Scatterers spaced more closely than a resolution cell can
+represent any speckle, and yet span only a small part of the data space: a row that is turned or
+moved by a fraction of a cell does not explain the echo. Least squares over strengths, angle and
+offset together (variable projection, in Kaufman's approximation [1]_) have none of the errors of an
+image's brightest line: each cell's speckle in its neighbours' sidelobes, levels that change along
+the wall, and its ends.
 
-What is left is noise and what the wall's own heights do beyond first order; both push the line
-independently from part to part, so the covariance follows from the pushes themselves
+The residual is noise, and the effect of the wall's own heights beyond first order; both are
+independent from part to part of the wall, so that the covariance follows from the parts' scores
 (:mod:`estimator.walls.cluster_robust_covariance`).
 
 References
@@ -37,8 +37,8 @@ from estimator.walls.cluster_robust_covariance import clustered_covariance
 from estimator.walls.dirichlet_kernel import Sweep, point_profiles
 
 OVERSAMPLING = 1.2
-"""Scatterers of the row, over those that hold all of the speckle that the echo can show. Fewer
-leave a part of it unexplained; more change nothing."""
+"""Scatterers of the row, over the degrees of freedom of the speckle that the echo can show. Fewer
+leave a part of it unexplained; more change nothing. [-]"""
 RANGE_MARGIN = 10
 """Bins of the range profiles before the nearest scatterer and beyond the farthest: Dirichlet's
 sidelobes fall below 1/10π of the peak there, −30 dB. [bins]"""
@@ -56,15 +56,17 @@ PLACES_OF_BAND, PLACES_OF_RANGE, PLACES_OF_SECTOR = 9, 33, 129
 """Places along a wall at which the bandwidth, the ranges and the sector of its echo are looked up;
 all of them vary smoothly. [-]"""
 STEPS = 2
-"""Gauss-Newton steps: from a hundredth of a cell the first leaves less than a thousandth."""
+"""Gauss-Newton steps: from an error of a hundredth of a cell the first leaves less than a
+thousandth. [-]"""
 FARTHEST_STEP = 0.5
-"""A step that moves an end by more says that the row explains something else. [cells]"""
+"""Largest displacement of an end from where the image has it: beyond, the row explains some other
+echo. [cells]"""
 FEWEST_CELLS = 7
-"""A shorter line is a point's neighbourhood."""
+"""Shortest line; a shorter one is the neighbourhood of a point. [cells]"""
 PART = 3.0
-"""Length of the parts of a wall that push it independently of each other. Within it they do not:
-what the row does not hold of a real wall's echo, say how an antenna's pattern weighs its parts at
-each position, pushes neighbours against each other, and hardly moves the line. [cells]"""
+"""Length of the parts of a wall whose scores are taken to be independent. Within a part they are
+not: what the model leaves out (for instance, an antenna's pattern that weighs places differently at
+each position) gives neighbouring places opposite scores. [cells]"""
 DEPTH = 4e-6
 """Of a wall's surface, against where it reflects: the phase of a lossy material's reflection
 changes with frequency as if it lay deeper. On drywall at 220 to 330 GHz 3 to 6 µm were measured;
@@ -103,7 +105,7 @@ def fit_coherently(
         Resolution along the wall and across it, at half power. [m]
     beyond
         How much longer the wall may be than what is found of it, before its start and beyond
-        its end: what its row does not hold would be explained by a turn. [m]
+        its end: echo of a part that the row does not reach would turn the line. [m]
     others
         Scatterers at known places that send echoes from the same ranges, with unknown strengths
         of their own. [m]
@@ -199,10 +201,10 @@ def _bandwidth_along(
 
 
 def _thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Echo:
-    """Leave out antenna positions that are not needed to tell the wall's parts apart.
+    """Keep every n-th antenna position, as many as resolve the wall's parts.
 
-    Only parts at about the same range have to be told apart by their angle: on a wall that is
-    seen at a slant these are few, and on one that faces the array all of it.
+    Only parts at about the same range have to be resolved by their angle: few on an inclined wall,
+    all of one that faces the array.
     """
     x = echo.positions[:, 0]
     points = np.linspace(start, end, PLACES_OF_SECTOR) - echo.positions.mean(axis=0)

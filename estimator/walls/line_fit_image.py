@@ -1,26 +1,26 @@
-r"""A wall's line below the resolution cell: maximise the image's brightness along it.
+r"""A wall's line from the image, below the resolution cell: the image's brightness is maximised.
 
 For trial lines (angle, offset) the image is focused on points of the line itself, and
 
 .. math:: J(\alpha, \rho) = \sum_s |I(p_s(\alpha, \rho))|
 
-is maximised by ever finer grids; the magnitude leads there from farther off than the intensity,
-which a few bright facets rule. The last step maximises
+is maximised by ever finer grids; the magnitude has a wider maximum than the intensity, which a few
+bright facets dominate. The last step maximises
 
 .. math:: K(\alpha, \rho) = \sum_s (1 - u_s^2)\, |I(p_s(\alpha, \rho))|^{3/2},
           \qquad -1 < u_s < 1 \text{ along the wall.}
 
-Each wavenumber along an endless wall holds one unknown of its speckle, and its waves are in step
-on the wall's line: the sum of the intensity of all of it is largest there, whatever the speckle
-is. What one cell's speckle pushes off the line, its neighbours' parts take back. A finite wall
-mixes the wavenumbers where the weight changes, and :math:`1 - u^2` makes that least for a tilt
-(it minimises :math:`\int |(wu)'|^2 / (\int w u^2)^2`). A power between magnitude and intensity
-bears walls whose own heights are what pushes. Over 124 realisations of six walls the tilt's
-error fell to 0.4 to 0.8 of that of J's summit (rms heights up to 0.05 mm), and rose to 1.2 on one
-of 0.1 mm.
+The speckle of an infinite wall has one unknown amplitude for each wavenumber along it, and these
+waves are in phase on the wall's line: the integral of the intensity is largest there for any
+speckle, as errors that one cell causes are cancelled by its neighbours. On a finite wall the weight
+mixes wavenumbers where it changes; :math:`1 - u^2` makes the resulting error of the tilt least (it
+minimises :math:`\int |(wu)'|^2 / (\int w u^2)^2`). A power between magnitude and intensity is more
+robust where the wall's own heights dominate the error. Over 124 realisations of six walls the
+tilt's error fell to 0.4 to 0.8 of that of J's maximum (rms heights up to 0.05 mm), and rose to 1.2
+on one of 0.1 mm.
 
-The summit is that of a paraboloid fitted over most of a cell. The covariance comes from how
-unevenly the parts of the wall push the line.
+The maximum is that of a paraboloid fitted over most of a cell. The covariance comes from the scores
+(gradients of K) of the places along the wall.
 """
 
 import numpy as np
@@ -52,34 +52,39 @@ NARROWER = 3
 """Width of a round's neighbourhood over the next one's: 1.3 steps of the grid on either side. [-]
 """
 MODES = 10
-"""Smooth modes along the wall that tell how strongly speckle pushes a line: the weight times
-polynomials, orthonormal, so that order 0 is what moves the line and order 1 what tilts it. Both
-are at rest at the summit; those of higher order say how large they would be. A cell's speckle
-pushes its neighbours' part of the line the other way, hence slow modes least."""
+"""Smooth modes along the wall onto which the scores are projected: the weight times polynomials,
+orthonormal. The mode of order 0 is the score of the offset, that of order 1 the score of the tilt.
+Both are zero at the maximum by definition; the power that they would have is extrapolated from
+higher orders. Scores of neighbouring cells are anticorrelated, so that smooth modes have least
+power. [-]"""
 RISES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""By how much the modes' power may rise with their rms slope along the wall, in units of that of
-order 1. [-]"""
+"""Models of the modes' power over their order, 1 + rise · slope, with the modes' rms slope along
+the wall in units of that of order 1: the likeliest rise is used. [-]"""
 LEAST_POWER = 0.08
-"""Power of a slow mode, over that of independent samples, that is assumed in any case: a few
-modes can be low by chance. [-]"""
+"""Least power of orders 0 and 1, over that of uncorrelated scores: the few modes of higher order
+may be low by chance. [-]"""
 TILT_SHARE, OFFSET_SHARE = 1.3, 0.9
 """Variance of tilt and offset over what the modes let expect. From 124 realisations of six walls
 (20 to 40 cm, 20° and 45°, 0.01 to 0.1 mm rms, metal and drywall, 30 and 75 GHz): 0.45 to 2.1,
-and 0.5 to 1.3."""
+and 0.5 to 1.3. ``python -m validation.experiments.thresholds walls``, with half the array, gave 0.2
+to 1.7 and 0.2 to 2.7, but 8 for the tilt of a wall of 40 cm at 0.4 m: lines that the echo does not
+place (:mod:`estimator.walls.line_refinement`) may state too small a variance there. [-]"""
 SUMMIT_SAMPLES_PER_CELL = 4
 """Along the wall; the intensity has twice the image's bandwidth."""
 BRIGHTNESS = (1.5, 1.0, 0.5)
-"""Powers of the magnitude that K sums, the first that has a summit where its slopes lead. On a wall
-that fades by tens of decibels, a rough one's few glints rule the first: it once led 0.7° off the
-wall, downwards. [-]"""
+"""Powers of the magnitude that K sums, tried in turn until K has a maximum near the line. On a
+rough wall whose level falls by tens of decibels, a few glints dominate the first power: it once
+gave a line 0.7° off the wall with a smaller K than at the start. [-]"""
 LEAST_RISE = 0.98
-"""K where the paraboloids led, over K where they began. [-]"""
+"""Least K at the fitted maximum, over K at the start: a maximum cannot be lower, but the paraboloid
+is fitted to within a per cent or two. [-]"""
 PASSES = 3
 """Times that the paraboloid is fitted about its own summit."""
 FEWEST_PLACES = 4
 """Places along a line that still have modes of a higher order than its tilt."""
 SUMMIT = 0.6
-"""Half the width of the neighbourhood that the paraboloid is fitted to. [cells]"""
+"""Half the width of the neighbourhood that the paraboloid is fitted to: there the main lobe departs
+from it by 1 %. [cells]"""
 
 
 def fit_line(
@@ -164,7 +169,7 @@ def _refined(
     resolution: Resolution,
     half_width: float,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Maximise J over a neighbourhood of so many cells, by ever finer grids."""
+    """Maximise J over a neighbourhood of ``half_width`` cells, by ever finer grids."""
     places = places_along(start, end, resolution)
     width = half_width * cell_across(start, end, resolution)
     length = float(np.linalg.norm(end - start))
@@ -189,7 +194,7 @@ def _summit(
     end: Float[np.ndarray, " 3"],
     resolution: Resolution,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]] | None:
-    """Move the line to the summit of K and return it with the covariance of its place."""
+    """Move the line to the maximum of K; return it with the covariance of its tilt and offset."""
     for power in BRIGHTNESS:
         found = _summit_of(focus, start, end, resolution, power)
         if found is not None:
@@ -204,10 +209,10 @@ def _summit_of(
     resolution: Resolution,
     power: float,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], Float[np.ndarray, "2 2"]] | None:
-    r"""Find the summit of K near a line; ``None`` if it has none there.
+    r"""Find the maximum of K near a line; ``None`` if it has none there.
 
-    K is a sum over places i, :math:`w_i (c_i + g_i x + h_i x^2 / 2)` near the summit. Where the
-    gradients :math:`g_i` of all places move the line is told by their smooth modes.
+    Near the maximum K is a sum over places i, :math:`w_i (c_i + g_i x + h_i x^2 / 2)`, with the
+    scores :math:`g_i`.
     """
     places = places_along(start, end, resolution, SUMMIT_SAMPLES_PER_CELL)
     reach = 0.5 * len(places) * float(places[1] - places[0])  # half of the length in use
@@ -238,7 +243,7 @@ def _summit_of(
         )[0, 0]
         start, end = ends[0], ends[1]
     if height() < LEAST_RISE * first:
-        return None  # the paraboloid led off a slope
+        return None  # a slope, not a maximum
     # Along the normal alone: a tilt moves the ends farther than a paraboloid describes.
     lines = np.stack([np.ones_like(unit), unit, unit**2 / 2], axis=-1)
     _, slopes, curvatures = np.linalg.lstsq(lines, brightness[TRIALS // 2])[0]
@@ -259,12 +264,12 @@ def _slow_power(
     across: Float[np.ndarray, " places"],
     weights: Float[np.ndarray, " places"],
 ) -> tuple[float, float]:
-    """Expect the power of the modes of order 0 and 1 from those of higher orders.
+    """Extrapolate the power of the modes of order 0 and 1 from those of higher orders.
 
     Parameters
     ----------
-    pushes
-        Gradient at each place.
+    scores
+        Gradient of K at each place.
     across
         The places, from -1 to 1.
     weights

@@ -1,4 +1,4 @@
-"""From the lines of the image to lines that explain the echo itself."""
+"""Refinement of lines found in the image by least squares on the echo itself."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,9 +19,10 @@ from estimator.walls.line_fit_echo import CoherentLine, fit_coherently
 from estimator.walls.line_relations import BEYOND_END, lies_on
 
 DISAGREEMENT = 6.0
-"""Square of what image and echo differ by, over both covariances, beyond which neither is right
-about its own. Of 116 lines in 33 rooms it was 5 to 16 in corners, and 3.3 at most elsewhere; on
-walls of 2 mm correlation, which show a few glints only, it may be as large. [-]"""
+"""Squared difference of the image's and the echo's line, over the sum of both covariances, beyond
+which both are taken to be too small and are enlarged. Of 116 lines in 33 rooms it was 5 to 16 in
+corners, and 3.3 at most elsewhere; on walls of 2 mm correlation length, which show a few glints
+only, it may be as large. [-]"""
 MOST_BESIDE = 12
 """Things brighter than a wall that are told apart from its echo; weaker ones do not pull it. Each
 adds nine unknowns to the fit. [-]"""

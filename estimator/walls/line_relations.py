@@ -1,4 +1,4 @@
-"""How lines of an image lie to points and to each other, seen from the array."""
+"""Relations between lines and points of an image: on, beyond, hidden, overlapping, edge-on."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Mirrors: the walls that an image shows, found without help."""
+"""Detection of the walls in a linear array's echo: candidates among peaks, fitted and tested."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,22 +31,25 @@ from estimator.walls.line_relations import (
 )
 
 LEAST_COHERENCE = 0.02
-"""Coherence of a peak that is one wave at all: sidelobes and the remains of what is nearer than
-the array is long have 1/M of M channels, speckle in a cell with twenty more has 0.05. [-]"""
+"""Least coherence factor of a peak: sidelobes, and things nearer than the array is long, have 1/M
+of M channels; speckle that shares its cell with twenty equal waves has 0.05. [-]"""
 MOST_BENT = 0.4
-"""Share of bent peaks on a wall's line. Of walls 0.3 to 1.7 m away at all angles, in simulated and
-full-wave echoes, a quarter at most are: those that nearly face the array, where many facets share a
-range. Of the lines that clouds and grating lobes feign, from half to all of them are. [-]"""
+"""Largest share of peaks with excess curvature on a wall's line. Of walls 0.3 to 1.7 m away at all
+angles, in simulated and full-wave echoes, it is a quarter at most: on those that nearly face the
+array, where many facets share a range. On lines through diffuse multipath and grating lobes it is
+from a half to all. [-]"""
 WALL_COHERENCE = 0.2
-"""Median coherence of the peaks on a wall that does not reflect the array in itself. Of the same
-walls it was 0.3 to 0.98; of what the ambiguities of range and angle feign, 0.04 and 0.1. [-]"""
+"""Least median coherence factor of the peaks on a wall that does not reflect the array in itself.
+Of the same walls it was 0.3 to 0.98; of ambiguities of range and angle, 0.04 and 0.1. [-]"""
 MOST_CANDIDATES = 8
-"""Lines sought among all peaks, bent ones included."""
+"""Most lines sought among all peaks, those with excess curvature included. [-]"""
 MOST_UNCERTAIN = 0.5
-"""Deviation of a wall's ends and of its offset: what is known no better than this is no line but
-scattered peaks. [cells]"""
+"""Largest standard deviation of a wall's ends and of its offset: what is known no better is no line
+but scattered peaks. True walls have 0.03 at most
+(``python -m validation.experiments.thresholds walls``). [cells]"""
 LEAST_CONTRAST = 10.0
-"""Level of a wall over its surroundings: speckle in a cloud has some lines 5 dB above it. [-]"""
+"""Least level of a wall over its surroundings: in diffuse multipath some lines through speckle are
+5 dB above it; walls at 20 dB of SNR are 40 dB above theirs. [-]"""
 LEAST_CONFIDENCE = 1 - false_alarm.WALL
 """Confidence of a wall that is reported. [-]"""
 NEAREST = 0.5

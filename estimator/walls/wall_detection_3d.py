@@ -1,7 +1,7 @@
-"""The plane walls that a planar array's echo shows, found without help.
+"""Detection of the plane walls in a planar array's echo.
 
-Two things tell of a wall. Its roughness shows all over it, as speckle: a plane among the peaks.
-And the part that is met head-on returns a wave as flat as the wall itself, whose direction and
+A wall shows in two ways. Its roughness scatters from all over it, as speckle: a plane among the
+image's peaks. And where it is perpendicular to the ray it returns a plane wave, whose direction and
 distance are the wall's normal and offset, to a small part of a wavelength.
 """
 

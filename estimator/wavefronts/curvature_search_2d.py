@@ -1,6 +1,6 @@
-"""Where to start a fit with free curvature: the best of a grid over angle, length and radius.
+"""The start of a wave's fit with free curvature: a grid search over angle, length and curvature.
 
-The likelihood has many summits over the radius of curvature: between two wavefronts whose
+The likelihood has many local maxima over the radius of curvature: between two wavefronts whose
 sagitta over the aperture differs by several wavelengths, it falls and rises again.
 """
 

@@ -1,10 +1,10 @@
-"""Where to start a wavefront's fit: the best of a grid over direction, length and curvature.
+"""The start of a wavefront's fit: a grid search over direction, length and curvature.
 
-The likelihood has many summits over the curvature, and a wave whose curvature is not that of
-its length peaks in the map beside its true direction
-(:mod:`estimator.wavefronts.curvature_search_2d` says so of linear arrays). On a sparse array it
-also repeats at the grating lobes; these are smeared over the band, so that the true direction
-explains most.
+The likelihood has many local maxima over the curvature (see
+:mod:`estimator.wavefronts.curvature_search_2d`), and a wave whose curvature is not that of its
+length peaks in the map beside its true direction. On a sparse array it also repeats at the grating
+lobes; these are smeared over the band, so that the true direction has the highest matched-filter
+output.
 """
 
 from dataclasses import dataclass

@@ -1,16 +1,16 @@
-r"""How far a measured wavefront departs from a sphere, from what the fit leaves over.
+r"""The phase error of a measured wavefront against a sphere, estimated from the fit's residual.
 
-Noise is white. What a rough mirror adds is not: a patch of it beside the specular point sends
-its part at another angle, hence as a fringe of some period over the aperture, and later by an
-excess that grows with the square of that angle. Over the aperture and the band it fills modes
-(p, q) along a parabola q ∝ p²; summed over q it is nearly the same in all of them, as the
-roughness' spectrum is flat up to one over its correlation length. So the modes that the fit
-leaves over tell the level in those that it takes for the wave's own: in the mean over
-the band (q = 0) p = 3 … 8 tell that of a tilt (p = 1), in the first mode over the band (q = 1)
-p = 1 … 3 that of a delay (p = 0).
+Noise is white; the error that a rough mirror adds is not. A patch of the mirror beside the specular
+point contributes a wave from another angle, hence a fringe of some period over the aperture, with
+an excess delay that grows with the square of that angle. In cosine modes (p over the aperture, q
+over the band) it lies along a parabola q ∝ p²; summed over q its power is nearly the same for all
+p, as the roughness' spectrum is flat up to one over the correlation length. The power of modes in
+the residual therefore gives that of modes that the fit absorbs: in the mean over the band (q = 0)
+p = 3 … 8 give the level of a tilt (p = 1), in the first mode over the band (q = 1) p = 1 … 3 that
+of a delay (p = 0).
 
-Within a Fresnel zone of the specular point a patch bends the phase only; farther out half of it
-goes into the amplitude. The sum of both is therefore what a slow error of the phase has.
+A patch within a Fresnel zone of the specular point changes the phase only; farther out half of its
+power changes the amplitude. The power of a slow phase error is therefore the sum of both.
 """
 
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ as the user does. A wave that a point (an edge, a rough patch) scatters keeps th
 delay, but its curvature is that of the last leg alone. Comparing both tells them apart.
 
 All waves of a pilot are fitted at once (RELAX in the limit), so that the sidelobes of one do not
-pull another. The covariance holds what noise does, and what bends the wavefront beside it
+bias another. The covariance contains the noise and the wavefront's phase error
 (:mod:`estimator.wavefronts.phase_error`): with N = JᵀJ and the error's own JᵀCJ it is N⁻¹ JᵀCJ N⁻¹.
 """
 
@@ -137,7 +137,8 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
 
     Returns
     -------
-    The waves. What the model leaves over beside noise is taken to bend each wave on its own.
+    The waves, in the order of their starts. What of the residual is more than noise is taken to be
+    a phase error of each wave (:mod:`estimator.wavefronts.phase_error`).
 
     Raises
     ------

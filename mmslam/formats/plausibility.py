@@ -1,4 +1,4 @@
-"""Is a measurement of a size that can be? Wrong units are the commonest mistake, and silent."""
+"""Checks that a measurement's magnitudes are physically possible: wrong units are refused."""
 
 import numpy as np
 from jaxtyping import Complex, Float

@@ -1,4 +1,4 @@
-"""What the user did wrong becomes one message and exit code 2; a bug keeps its traceback."""
+"""Exit codes: bad input gives one message and 2, Ctrl-C gives 130; a bug keeps its traceback."""
 
 import contextlib
 import os

@@ -1,8 +1,8 @@
-"""Ctrl-C where it can be borne.
+"""Ctrl-C (SIGINT), delayed until the program can stop without losing or damaging anything.
 
-An exception that arises inside a C++ library (an import of Mitsuba, a kernel of Dr.Jit that
-calls back into Python) may come out as another one, or abort the whole process, and then
-nothing is tidied up.
+A KeyboardInterrupt raised inside a C++ library (an import of Mitsuba, a kernel of Dr.Jit that
+calls back into Python) may be replaced by another exception or abort the whole process, and then
+no ``finally`` block runs.
 """
 
 import signal
@@ -13,21 +13,22 @@ from types import FrameType
 
 
 class ResumableInterruption(KeyboardInterrupt):
-    """Ctrl-C came while something was made that can be gone on with; the message says how."""
+    """Ctrl-C interrupted work that can be resumed; the message says how."""
 
 
 @contextmanager
 def interruptions_held() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C back until the block ends; pressed twice, it comes at once.
+    """Delay Ctrl-C to the end of the block; pressed a second time, it takes effect at once.
 
     Yields
     ------
-    Function that lets a held interruption through: call it where one can be borne.
+    Function that raises a delayed interruption: call it at places where stopping is safe.
 
     Raises
     ------
     KeyboardInterrupt
-        At the end of the block, or by that function, if Ctrl-C was pressed.
+        At the end of the block, or by that function, if Ctrl-C was pressed; at once if it was
+        pressed twice.
     """
     presses = 0
 
@@ -48,7 +49,7 @@ def interruptions_held() -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def interruptions_noted() -> Iterator[Callable[[], bool]]:
-    """Remember that Ctrl-C was pressed, whatever exception becomes of it on its way.
+    """Record that Ctrl-C was pressed, even if a library replaces the KeyboardInterrupt.
 
     Yields
     ------

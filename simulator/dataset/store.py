@@ -1,4 +1,4 @@
-"""A dataset on disk while it grows: nothing in it is ever half-written, and it can be taken up.
+"""A dataset on disk while it is made: every file is complete or absent, and work can resume.
 
 Beside ``FILE.zarr`` lies ``FILE.zarr.unfinished`` until all samples are there::
 

@@ -212,7 +212,7 @@ def _distributed() -> Any:
 
 
 def _quieten() -> None:
-    """Keep what the cluster says to itself off the screen: workers that die are expected."""
+    """Silence the cluster's own log messages: workers that die are expected and replaced."""
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
@@ -223,10 +223,10 @@ def _in_worker(function: Callable[..., Any], arguments: tuple[object, ...]) -> A
 
 
 def dask_setup(worker: Any) -> None:
-    """Make a worker of this machine deaf to Ctrl-C, which a terminal sends to all at once.
+    """Let a worker of this machine ignore Ctrl-C, which a terminal sends to all processes.
 
-    Dask calls it in each worker's main thread as it starts. It is the process that hands out the
-    work that stops them then.
+    Dask calls it in each worker's main thread as it starts. The scheduling process handles Ctrl-C
+    and stops the workers.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

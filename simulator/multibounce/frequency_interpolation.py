@@ -1,8 +1,8 @@
-r"""How few frequencies carry a band: waves whose delays lie close together vary slowly over it.
+r"""Interpolation over frequency: sums of waves with similar delays, from a few Chebyshev nodes.
 
-Once a common delay is taken out of contributions that lie within an interval of delays, they
-are interpolated from a few Chebyshev nodes; where that takes as many frequencies as there are,
-every frequency is worked out.
+Once a common delay is taken out of contributions whose delays lie within an interval, they vary
+slowly over the band and are interpolated from a few Chebyshev nodes. Where that would need as many
+nodes as there are frequencies, every frequency is computed.
 """
 
 import threading
@@ -24,10 +24,10 @@ CHAIN_ACCURACY = 1e-4
 Chains are summed in single precision and by physical optics, which is good to some 1e-2. [-]"""
 
 MOST_NODES = 4096
-"""Nodes that a chain is tried out at; one that needs more is worked out at every frequency."""
+"""Most nodes of a chain; one that needs more is computed at every frequency. [-]"""
 
 INCIDENCES = (STEEP, 0.3, 0.5, 0.7, 0.85, 1.0)
-"""Cosines of incidence that surfaces are tried out at. [-]"""
+"""Cosines of incidence at which the number of nodes is determined. [-]"""
 
 
 @dataclass(frozen=True)

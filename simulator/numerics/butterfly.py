@@ -1,4 +1,4 @@
-r"""Links between two faces, block by block: what distant blocks exchange has a low rank.
+r"""Butterfly sum: links between the facets of two faces, block by block, at low rank.
 
 Between a block of facets around :math:`w_0` and one around :math:`q_0` the phase is split,
 

@@ -1,4 +1,4 @@
-r"""How few places carry an aperture: what a small patch scatters varies slowly over the array.
+r"""Interpolation over the aperture: what a small patch scatters, from a few positions of it.
 
 Once the delay of a patch's centre is taken out, its triangles' sum turns, over a half aperture
 :math:`h` along an axis, by at most :math:`\delta = k \rho h / R` for each end that moves, with

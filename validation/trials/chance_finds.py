@@ -40,7 +40,7 @@ def highest_of_cells(rng: np.random.Generator, *, trials: int = 4000, cells: int
     return Row(
         name=f"false_alarm.threshold: highest of {cells} cells above it at a rate of {rate:g}",
         stated=f"{rate:g}",
-        measured=float(np.mean(highest > false_alarm.threshold(rate, cells=cells))),
+        measured=float(np.mean(highest > false_alarm.threshold(rate, cells=float(cells)))),
         low=low,
         high=high,
         origin=f"binomial scatter of {trials} trials",
