@@ -28,7 +28,7 @@ TIE = 1e-6
 places lie on borders up to rounding, which must not decide. [parts]"""
 
 
-def clustered_covariance(
+def cluster_robust_covariance(
     places: Float[np.ndarray, " places"],
     designs: Float[np.ndarray, "places parameters"],
     scores: Float[np.ndarray, " places"],

@@ -33,7 +33,7 @@ from scipy.linalg.blas import zherk
 
 from estimator.geometry.wall_2d import unit_normal
 from estimator.measurement.model import Echo, frequency_step
-from estimator.walls.cluster_robust_covariance import clustered_covariance
+from estimator.walls.cluster_robust_covariance import cluster_robust_covariance
 from estimator.walls.dirichlet_kernel import Sweep, point_profiles
 
 OVERSAMPLING = 1.2
@@ -155,7 +155,7 @@ def fit_coherently(
     gains = (strengths.conj()[:, None] * _adjoint(slopes, moved)).real
     designs = np.stack([np.ones_like(levers), levers], axis=-1)
     # Of (offset, displacement of the ends).
-    by_step = clustered_covariance(places, designs, scores, gains, part=PART * cell_along)
+    by_step = cluster_robust_covariance(places, designs, scores, gains, part=PART * cell_along)
     # An end that moves along the normal by δ turns the line by −2δ over its length.
     to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
     covariance = to_angle @ by_step @ to_angle.T

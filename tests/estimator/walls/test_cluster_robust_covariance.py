@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimator.walls.cluster_robust_covariance import clustered_covariance
+from estimator.walls.cluster_robust_covariance import cluster_robust_covariance
 
 PLACES = np.linspace(-0.1, 0.1, 241)
 DESIGNS = np.stack([np.ones_like(PLACES), 10 * PLACES], axis=-1)
@@ -29,7 +29,7 @@ def drawn(
         found = np.linalg.solve(DESIGNS.T @ gains, gains.T @ data)
         scores = weights * (data - DESIGNS @ found)
         errors.append(found)
-        covariances.append(clustered_covariance(PLACES, DESIGNS, scores, gains, part=PART))
+        covariances.append(cluster_robust_covariance(PLACES, DESIGNS, scores, gains, part=PART))
     return np.array(errors), np.array(covariances)
 
 
@@ -85,7 +85,7 @@ def test_rounding_does_not_decide_to_which_part_a_place_belongs() -> None:
     # 241 places in twelve parts: every twentieth lies on a cut.
     scores = np.random.default_rng(2).normal(size=PLACES.size)
     first, other = (
-        clustered_covariance(places, DESIGNS, scores, DESIGNS, part=PART)
+        cluster_robust_covariance(places, DESIGNS, scores, DESIGNS, part=PART)
         for places in (PLACES * (1 - 1e-13), PLACES * (1 + 1e-13) + 1e-16)
     )
     np.testing.assert_allclose(first, other, rtol=1e-9)
