@@ -1,9 +1,7 @@
 r"""The spherical-wave matched filter of one user's pilot, over angle and path length."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution import HALF_POWER
@@ -14,17 +12,6 @@ from estimator.results.estimate import AngleRangeMap
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 Y_AXIS = np.array([0.0, 1.0, 0.0])
-
-
-@dataclass(frozen=True, kw_only=True)
-class DirectionRangeMap:
-    """The matched filter of a planar array over azimuth, elevation and path length."""
-
-    values: Complex[np.ndarray, "azimuths elevations ranges"]
-    azimuth: Float[np.ndarray, " azimuths"]  # from the first axis, in the horizontal [rad]
-    elevation: Float[np.ndarray, " elevations"]  # above the horizontal [rad]
-    path_length: Float[np.ndarray, " ranges"]  # [m]
-    user: str
 
 
 def angle_range_map(
@@ -104,53 +91,6 @@ def polar_points(
     )
     direction = np.cos(aoa)[:, None] * along + np.sin(aoa)[:, None] * across
     return np.asarray(centre + path_length[None, :, None] * direction[:, None, :])
-
-
-def direction_range_map(
-    uplink: Uplink,
-    *,
-    azimuth: Float[np.ndarray, " azimuths"],
-    elevation: Float[np.ndarray, " elevations"],
-    path_length: Float[np.ndarray, " ranges"],
-    centre: Float[np.ndarray, " 3"] | None = None,
-) -> DirectionRangeMap:
-    """Match a planar array's pilot over azimuth, elevation and path length.
-
-    Parameters
-    ----------
-    uplink
-        The user's pilot at a planar array.
-    azimuth
-        Angle in the horizontal plane from +x; +y is π/2. [rad]
-    elevation
-        Angle above the horizontal plane. [rad]
-    path_length
-        Path lengths from the array's centre, in one way. [m]
-    centre
-        Where they are counted from; ``None``: the mean of the elements. [m]
-
-    Returns
-    -------
-    Complex map; a unit wave from a grid point peaks at 1.
-
-    Raises
-    ------
-    MeasurementError
-        If a path length is beyond the unambiguous one.
-    """
-    origin = uplink.positions.mean(axis=0) if centre is None else centre
-    across, up = np.meshgrid(azimuth, elevation, indexing="ij")
-    direction = np.stack(
-        [np.cos(up) * np.cos(across), np.cos(up) * np.sin(across), np.sin(up)], axis=-1
-    )
-    points = origin + path_length[:, None] * direction[:, :, None, :]
-    return DirectionRangeMap(
-        values=focus_uplink(uplink, points),
-        azimuth=azimuth,
-        elevation=elevation,
-        path_length=path_length,
-        user=uplink.user,
-    )
 
 
 def default_angles(

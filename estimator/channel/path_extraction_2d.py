@@ -1,20 +1,26 @@
-"""A user's paths: waves taken out of the pilot one after the other, fitted together, each tested.
-
-A path that a flat mirror reflects, or none, is a spherical wave whose curvature agrees with
-its delay. A wave that an edge or a rough patch scatters is rounder: it is told apart by that.
-"""
+"""A user's paths at a linear array: waves taken out of the pilot one by one, fitted together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import angle_range_map
+from estimator.channel.path import (
+    LEAST_SHARE,
+    MOST_PATHS,
+    Path,
+    PathSet,
+    no_paths,
+)
+from estimator.geometry.bearing_2d import LINEAR
 from estimator.measurement.model import Uplink
 from estimator.results.estimate import AngleRangeMap
 from estimator.wavefronts.curvature_search_2d import search_curvature
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.wave_fit_2d import (
     FittedWaves,
@@ -24,57 +30,8 @@ from estimator.wavefronts.wave_fit_2d import (
     fit_spherical_waves,
 )
 
-MOST_PATHS = 4
-LEAST_SHARE = 0.05
-"""Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
-FALSE_ALARM = 1e-6
-"""Probability that noise alone gives a wave somewhere in the map. [-]"""
 UNRESOLVED = 0.5
 """Cells λ/D and c/B apart below which two waves are one. [-]"""
-CURVATURE_DEVIATIONS = 6.0
-"""Deviations by which curvature and delay may disagree; the covariance is an estimate from few
-modes itself, and a rough mirror bends the wavefront in ways it only samples."""
-CURVATURE_SLACK = 0.1
-"""Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Path:
-    """One wave of the pilot, in the array's frame."""
-
-    wave: SphericalWave  # with the curvature of its delay if that agrees, else with its own
-    free: SphericalWave  # fitted with a curvature of its own
-    share: float  # of the pilot's energy, less the noise [-]
-    unambiguous: float  # longest path that the frequency step tells apart [m]
-
-    @property
-    def specular(self) -> bool:
-        """Whether the wave's curvature is that of a path of this length."""
-        return self._agrees_with(self.free.path_length)
-
-    @property
-    def unfolded(self) -> float | None:
-        """A path length beyond the unambiguous one that fits the curvature, if one does. [m]."""
-        longer = [self.free.path_length + turns * self.unambiguous for turns in (1, 2, 3)]
-        nearest = min(longer, key=lambda length: abs(1 / length - 1 / self.free.radius))
-        return nearest if self._agrees_with(nearest) else None
-
-    def _agrees_with(self, length: float) -> bool:
-        deviation = np.sqrt(self.free.covariance[2, 2]) / self.free.radius**2
-        allowed = CURVATURE_DEVIATIONS * deviation + CURVATURE_SLACK / length
-        return bool(abs(1 / self.free.radius - 1 / length) <= allowed)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PathSet:
-    """All paths of one pilot, with what is known of them together."""
-
-    paths: tuple[Path, ...]  # strongest first
-    covariance: Float[np.ndarray, "bound bound"]  # of (aoa, path length) of each wave
-    free_covariance: Float[np.ndarray, "free free"]  # of (aoa, path length, radius) of each one
-
-
-NO_PATHS = PathSet(paths=(), covariance=np.zeros((0, 0)), free_covariance=np.zeros((0, 0)))
 
 
 def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = True) -> PathSet:
@@ -97,7 +54,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
     energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
     # A matched filter's output of noise is exponential: this is passed by chance in one map
     # of a million.
-    least = noise * float(np.log(first_map.values.size / FALSE_ALARM))
+    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=first_map.values.size)
     found: FittedWaves | None = None
     residual, this_map = uplink, first_map
     while found is None or len(found.waves) < MOST_PATHS:
@@ -120,7 +77,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             if _unresolved(uplink, joint.waves):
                 break  # a rough wall bent one wave's front; two would describe it, and cancel
             found = joint
-        except ValueError:
+        except NoWaveError:
             break  # no maximum near the peak: a ridge, not a wave; or no second wave
         residual = replace(residual, samples=found.residual)
         remaining = float(np.sum(np.abs(residual.samples) ** 2)) - noise * residual.samples.size
@@ -130,7 +87,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             residual, aoa=first_map.aoa, path_length=first_map.path_length, centre=np.zeros(3)
         )
     if found is None:
-        return NO_PATHS
+        return no_paths(LINEAR)
     order = np.argsort([-wave.explained for wave in found.waves], kind="stable")
     keep = (3 * order[:, None] + np.arange(3)).ravel()
     free = tuple(found.waves[i] for i in order)
@@ -145,15 +102,22 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
         )
         for wave in free
     )
-    free_covariance = found.covariance[np.ix_(keep, keep)]
+    by_radius = found.covariance[np.ix_(keep, keep)]
     lengths = (3 * np.arange(len(paths))[:, None] + np.arange(2)).ravel()
-    covariance = free_covariance[np.ix_(lengths, lengths)]
+    covariance = by_radius[np.ix_(lengths, lengths)]
+    # A radius R that errs by δ is a curvature that errs by -δ/R²: that is what errs evenly.
+    slopes = np.array([[1.0, 1.0, -(wave.curvature**2)] for wave in free]).ravel()
     if clock_known:
         try:
-            paths, covariance = _bound(uplink, paths)
-        except ValueError:
+            paths, covariance = _bound(uplink, paths, free)
+        except NoWaveError:
             pass  # the summit with the delay's curvature lies elsewhere: keep the free one
-    return PathSet(paths=paths, covariance=covariance, free_covariance=free_covariance)
+    return PathSet(
+        paths=paths,
+        covariance=covariance,
+        free_covariance=by_radius * np.outer(slopes, slopes),
+        how=LINEAR,
+    )
 
 
 def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
@@ -178,16 +142,16 @@ def _starts(waves: Sequence[SphericalWave]) -> list[WaveStart]:
 
 
 def _bound(
-    uplink: Uplink, paths: tuple[Path, ...]
+    uplink: Uplink, paths: Sequence[Path], free: Sequence[SphericalWave]
 ) -> tuple[tuple[Path, ...], Float[np.ndarray, "bound bound"]]:
     """Fit all waves again, those whose curvature agrees with their delay with that curvature."""
     starts = [
         WaveStart(
-            aoa=path.free.aoa,
-            path_length=path.free.path_length,
-            radius=None if path.specular else path.free.radius,
+            aoa=wave.aoa,
+            path_length=wave.path_length,
+            radius=None if path.specular else wave.radius,
         )
-        for path in paths
+        for path, wave in zip(paths, free, strict=True)
     ]
     fitted = fit_spherical_waves(uplink, starts)
     sizes = [2 if start.radius is None else 3 for start in starts]

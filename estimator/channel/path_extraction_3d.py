@@ -5,64 +5,32 @@ reflect, or none, has the curvature of its delay; a wave that an edge or a rough
 rounder.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.constants import speed_of_light
+from scipy.linalg import block_diag
 
+from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray
 from estimator.channel.angle_range_map_3d import direction_map
+from estimator.channel.path import LEAST_SHARE, MOST_PATHS, Path, PathSet
+from estimator.geometry.bearing_3d import PLANAR
 from estimator.imaging.range_gating import gated
 from estimator.measurement.model import Uplink
 from estimator.results.estimate import DirectionMap
 from estimator.wavefronts.curvature_search_3d import WavefrontStart, search_wavefront
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront, wavefront_field
 
-MOST_PATHS = 4
-LEAST_SHARE = 0.05
-"""Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
-FALSE_ALARM = 1e-6
-"""Probability that noise alone gives a wave somewhere in the map. [-]"""
-CURVATURE_DEVIATIONS = 6.0
-"""Deviations by which curvature and delay may disagree; the robust covariance is an estimate
-from few tiles itself, and a rough mirror bends the wavefront in ways it only samples."""
-CURVATURE_SLACK = 0.1
-"""Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]."""
 ORDERS = (-1, 0, 1)
 """Grating lobes, along each axis, at which a wave may really have arrived."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpacePath:
-    """One wave of the pilot, in the array's frame."""
-
-    wave: Wavefront  # fitted with the curvature of its delay
-    free: Wavefront  # fitted with a curvature of its own
-    share: float  # of the pilot's energy, less the noise [-]
-    unambiguous: float  # longest path that the frequency step tells apart [m]
-
-    @property
-    def specular(self) -> bool:
-        """Whether the wave's curvature is that of a path of this length."""
-        return self._agrees_with(self.wave.path_length)
-
-    @property
-    def unfolded(self) -> float | None:
-        """A path length beyond the unambiguous one that fits the curvature, if one does. [m]."""
-        longer = [self.wave.path_length + turns * self.unambiguous for turns in (1, 2, 3)]
-        nearest = min(longer, key=lambda length: abs(1 / length - self.free.curvature))
-        return nearest if self._agrees_with(nearest) else None
-
-    def _agrees_with(self, length: float) -> bool:
-        deviation = float(np.sqrt(self.free.covariance[3, 3]))
-        allowed = CURVATURE_DEVIATIONS * deviation + CURVATURE_SLACK / length
-        return bool(abs(self.free.curvature - 1 / length) <= allowed)
-
-
 def find_space_paths(
-    uplink: Uplink, array: PlanarArray, first_map: DirectionMap
-) -> tuple[SpacePath, ...]:
+    uplink: Uplink, array: PlanarArray, first_map: DirectionMap, *, clock_known: bool = True
+) -> PathSet:
     """Take the strongest waves out of a pilot, one after the other.
 
     Parameters
@@ -73,18 +41,21 @@ def find_space_paths(
         Its extents.
     first_map
         Its direction map.
+    clock_known
+        Whether a delay is a length; if not, no curvature is taken from it.
 
     Returns
     -------
-    The waves in the order in which they were taken out; each holds at least
-    :data:`LEAST_SHARE` of the energy.
+    The waves, strongest first; each holds at least :data:`LEAST_SHARE` of the energy. Each is
+    fitted by itself in a gate of delays, so that the errors of different ones are taken to be
+    independent.
     """
     noise = noise_variance(uplink.samples)
     energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
-    least = noise * float(np.log(first_map.values.size / FALSE_ALARM))
+    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=first_map.values.size)
     step = float(uplink.frequencies[1] - uplink.frequencies[0])
     cell = speed_of_light / float(np.ptp(uplink.frequencies))
-    paths: list[SpacePath] = []
+    paths: list[Path] = []
     residual, this_map = uplink, first_map
     while len(paths) < MOST_PATHS:
         power = np.abs(this_map.values) ** 2
@@ -101,23 +72,44 @@ def find_space_paths(
                 path_length=start.path_length,
                 curvature=start.curvature,
             )
-            wave = fit_wavefront(near, cosines=free.cosines, path_length=free.path_length)
-        except ValueError:
+        except NoWaveError:
             break  # no summit near the peak: a ridge, not a wave
         # With its own curvature, whatever it is, less of the wave is left behind.
         field = wavefront_field(residual.positions, residual.frequencies, free)
         share = float(np.vdot(field, field).real) / energy
         if share < LEAST_SHARE:
             break  # speckle
-        paths.append(
-            SpacePath(wave=wave, free=free, share=share, unambiguous=speed_of_light / step)
+        path = Path(
+            wave=replace(free, covariance=free.covariance[:3, :3]),
+            free=free,
+            share=share,
+            unambiguous=speed_of_light / step,
         )
+        paths.append(_bound(near, path) if clock_known and path.specular else path)
         residual = replace(residual, samples=residual.samples - field)
         remaining = float(np.sum(np.abs(residual.samples) ** 2)) - noise * residual.samples.size
         if remaining < LEAST_SHARE * energy:
             break
         this_map = direction_map(residual, array, least_share=LEAST_SHARE, within=first_map)
-    return tuple(paths)
+    paths.sort(key=lambda path: -path.share)
+    nothing = np.zeros((0, 0))
+    return PathSet(
+        paths=tuple(paths),
+        covariance=block_diag(nothing, *(path.wave.covariance for path in paths)),
+        free_covariance=block_diag(nothing, *(path.free.covariance for path in paths)),
+        how=PLANAR,
+    )
+
+
+def _bound(near: Uplink, path: Path) -> Path:
+    """Fit a wave again with the curvature of its delay."""
+    free = path.free
+    assert isinstance(free, Wavefront)
+    try:
+        wave = fit_wavefront(near, cosines=free.cosines, path_length=free.path_length)
+    except NoWaveError:
+        return path  # the summit with the delay's curvature lies elsewhere: keep the free one
+    return replace(path, wave=wave)
 
 
 def _best_lobe(

@@ -28,6 +28,7 @@ from estimator.channel.angle_range_map_2d import (
 )
 from estimator.imaging.peak_detection import mean_background
 from estimator.measurement.model import MeasurementError, Uplink
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.wave_fit_2d import (
     FittedWaves,
     WaveStart,
@@ -117,7 +118,7 @@ def extract_paths(
         starts = [WaveStart(aoa=wave.aoa, path_length=wave.path_length) for wave in before]
         try:
             candidate = fit_spherical_waves(local, [*starts, start])
-        except ValueError:
+        except NoWaveError:
             break  # no maximum of its own: what is left is no wave
         if _coincide(local, candidate):
             break

@@ -1,46 +1,41 @@
+from .bearing import Bearing
+from .bearing_2d import LINEAR
+from .bearing_3d import PLANAR
+from .flat_wall import FlatWall
 from .path_covariance import input_covariance, polar_slopes, rests_on
-from .path_tracing_2d import project
-from .path_tracing_3d import (
-    SpaceProjection,
-    central_slopes,
-    folded_over,
-    project_in_space,
-    slopes_by_wall,
-)
-from .specular_chains_2d import image_over, possible_chains, seen_over, unfolded
-from .specular_chains_3d import (
-    chains_in_space,
-    image_in_space,
-    seen_over_in_space,
-    unfolded_in_space,
-)
+from .path_tracing import Projection, project, trace
+from .specular_chains import Chain, chain_to, image_over, seen_over, unfolded, unfolded_over
+from .specular_chains_2d import possible_chains
 from .wall_2d import Wall, crossing, mirrored, unit_normal
 from .wall_3d import PlaneWall, hidden_by, mirrored_about, within
+from .wall_covariance import joint_covariance, place_covariance
 
 __all__ = [
+    "LINEAR",
+    "PLANAR",
+    "Bearing",
+    "Chain",
+    "FlatWall",
     "PlaneWall",
-    "SpaceProjection",
+    "Projection",
     "Wall",
-    "central_slopes",
-    "chains_in_space",
+    "chain_to",
     "crossing",
-    "folded_over",
     "hidden_by",
-    "image_in_space",
     "image_over",
     "input_covariance",
+    "joint_covariance",
     "mirrored",
     "mirrored_about",
+    "place_covariance",
     "polar_slopes",
     "possible_chains",
     "project",
-    "project_in_space",
     "rests_on",
     "seen_over",
-    "seen_over_in_space",
-    "slopes_by_wall",
+    "trace",
     "unfolded",
-    "unfolded_in_space",
+    "unfolded_over",
     "unit_normal",
     "within",
 ]

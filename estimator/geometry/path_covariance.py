@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from estimator.geometry.specular_chains_2d import Chain, image_over
-from estimator.geometry.wall_2d import Wall, mirrored
-
-STEP = 1e-6
-"""Of the central differences; as far from rounding as from the curvature. [m], [rad]."""
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.path_tracing import slopes_by_wall
+from estimator.geometry.specular_chains import Chain, image_over, unfolded_over
+from estimator.geometry.wall_2d import Wall
 
 
 def input_covariance(
@@ -79,13 +78,7 @@ def _place_by_walls(
     """Differentiate the place of a ghost that is folded over a chain by all walls."""
     ghost = image_over(user, walls, over)
 
-    def folded(moved: Sequence[Wall]) -> Float[np.ndarray, " 3"]:
-        place = ghost
-        for index in over:
-            place = mirrored(place, moved[index].start, moved[index].end)
-        return place
-
-    return _by_walls(folded, walls, over)
+    return _by_walls(lambda moved: unfolded_over(ghost, moved, over), walls, over)
 
 
 def path_covariance(
@@ -106,21 +99,14 @@ def path_covariance(
 
 
 def _by_walls(
-    place: Callable[[Sequence[Wall]], Float[np.ndarray, " 3"]],
+    place: Callable[[Sequence[FlatWall]], Float[np.ndarray, " 3"]],
     walls: Sequence[Wall],
     chain: Chain,
 ) -> Float[np.ndarray, "2 parameters"]:
     """Differentiate a place by the angle and offset of each wall that it depends on."""
     slopes = np.zeros((2, 2 * len(walls)))
     for index in set(chain):
-        for parameter, change in enumerate(np.eye(2) * STEP):
-            ends = []
-            for sign in (1.0, -1.0):
-                tilt, offset = (sign * change).tolist()
-                moved = list(walls)
-                moved[index] = walls[index].moved(tilt=tilt, offset=offset)
-                ends.append(place(moved)[:2])
-            slopes[:, 2 * index + parameter] = (ends[0] - ends[1]) / (2 * STEP)
+        slopes[:, 2 * index : 2 * index + 2] = slopes_by_wall(place, walls, index)[:2]
     return slopes
 
 

@@ -1,129 +1,101 @@
-"""Chains of plane mirrors in space: over which of them the array sees a point of its image.
+"""Which chains of plane walls a ray from a planar array can follow at all.
 
-The raw image shows everything on the straight line that its wave seems to come along. Followed
-from the array and folded at each wall that it meets, that line ends where the thing really is.
+A chain's mirrors appear, each as an image, behind one another. Rays through all of them form a
+convex beam with its apex at the array; the next mirror's image is clipped to it, and to what is
+behind the mirror before, as in beam tracing.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise, product
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
-from estimator.geometry.path_tracing_3d import GRAZING, folded_over
-from estimator.geometry.wall_3d import PlaneWall, within
+from estimator.geometry.specular_chains import LONGEST_CHAIN, Chain, image_over
+from estimator.geometry.wall_3d import PlaneWall
 
-Chain = tuple[int, ...]
-"""Indices of walls, from the array outward."""
+EDGE_ON = 1e-9
+"""Sine of the angle at which a polygon seen from the array has no area left. [-]"""
 
 
-def unfolded_in_space(
-    points: Float[np.ndarray, "n 3"],
-    walls: Sequence[PlaneWall],
-    *,
-    deepest: int,
-    skin: float = 0.0,
-) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "n deepest"]]:
-    """Follow the straight lines to points of the raw image, and fold them at each wall.
+def possible_chains(
+    walls: Sequence[PlaneWall], *, deepest: int = LONGEST_CHAIN, reach: float = np.inf
+) -> Iterator[Chain]:
+    """Go through the chains that some ray from the array could follow; the empty one first.
+
+    What stands between is not looked at.
 
     Parameters
     ----------
-    points
-        In the frame of an array at the origin. [m]
     walls
         All mirrors, at their true place.
     deepest
-        Most walls on the way.
-    skin
-        How far behind a wall a line must go on to be folded there: what is less far is the wall's
-        own image. [m]
-
-    Returns
-    -------
-    Where the lines end [m], and the walls on the way of each; -1 where there are no more.
+        Most mirrors of a chain.
+    reach
+        Longest path that is of interest: a chain whose last mirror appears beyond is none. [m]
     """
-    places = np.zeros_like(points)
-    left = np.linalg.norm(points, axis=1)
-    directions = points / np.maximum(left, 1e-300)[:, None]
-    chains = np.full((len(points), deepest), -1)
-    going = np.flatnonzero(left > 0) if walls else np.zeros(0, dtype=np.int64)
-    for bounce in range(deepest):
-        if not going.size:
-            break
-        distance, met = _next_walls(
-            places[going],
-            directions[going],
-            left[going],
-            walls,
-            skin,
-            before=chains[going, bounce - 1] if bounce else np.full(going.size, -1),
-        )
-        hit = met >= 0
-        going, met, distance = going[hit], met[hit], distance[hit]
-        chains[going, bounce] = met
-        places[going] += distance[:, None] * directions[going]
-        left[going] -= distance
-        normals = np.array([wall.normal for wall in walls])[met]
-        across = np.einsum("nx,nx->n", directions[going], normals)
-        directions[going] -= 2 * across[:, None] * normals
-    return places + left[:, None] * directions, chains
+    yield from _continued(walls, (), np.zeros((0, 3)), deepest, reach)
 
 
-def _next_walls(
-    places: Float[np.ndarray, "n 3"],
-    directions: Float[np.ndarray, "n 3"],
-    left: Float[np.ndarray, " n"],
+def _continued(
     walls: Sequence[PlaneWall],
-    skin: float,
-    *,
-    before: Int[np.ndarray, " n"],
-) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-    """Return the wall that each line meets next, and how far away; -1 without one."""
-    nearest, met = left.copy(), np.full(len(places), -1)
+    chain: Chain,
+    beam: Float[np.ndarray, "sides 3"],
+    deepest: int,
+    reach: float,
+) -> Iterator[Chain]:
+    yield chain
+    if len(chain) == deepest:
+        return
     for index, wall in enumerate(walls):
-        slope = directions @ wall.normal
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = ((wall.centre - places) @ wall.normal) / slope
-        ahead = (distance > GRAZING) & (distance < nearest) & (before != index)
-        ahead &= (left - distance) * np.abs(slope) > skin
-        chosen = np.flatnonzero(ahead)
-        crossing = places[chosen] + distance[chosen, None] * directions[chosen]
-        chosen = chosen[within(crossing, wall)]
-        nearest[chosen], met[chosen] = distance[chosen], index
-    return nearest, met
+        if chain and chain[-1] == index:
+            continue
+        image = image_over(wall.corners, walls, chain)
+        for side in beam:
+            image = _clipped(image, side, 0.0)
+        if chain:
+            last = image_over(walls[chain[-1]].corners, walls, chain[:-1])
+            normal = np.cross(last[1] - last[0], last[2] - last[0])
+            here = float(last[0] @ normal)
+            image = _clipped(image, np.sign(here) * normal, abs(here))
+        narrower = _beam_through(image)
+        if narrower is not None and _plane_distance(image) <= reach:
+            yield from _continued(walls, (*chain, index), narrower, deepest, reach)
 
 
-def seen_over_in_space(
-    images: Float[np.ndarray, "n 3"], walls: Sequence[PlaneWall], chain: Chain, *, skin: float
-) -> Bool[np.ndarray, " n"]:
-    """Tell which points of the raw image are seen over exactly this chain.
-
-    Parameters
-    ----------
-    images, walls, skin
-        As in :func:`unfolded_in_space`.
-    chain
-        Of at least one wall.
-    """
-    first = walls[chain[0]]
-    # Most points are not behind the first wall: they need not be followed.
-    side = float(np.sign(first.centre @ first.normal))
-    seen: np.ndarray = side * ((images - first.centre) @ first.normal) > 0
-    chains = unfolded_in_space(images[seen], walls, deepest=len(chain) + 1, skin=skin)[1]
-    seen[seen] = np.all(chains == [*chain, -1], axis=1)
-    return seen
+def _clipped(
+    polygon: Float[np.ndarray, "corners 3"], normal: Float[np.ndarray, " 3"], offset: float
+) -> Float[np.ndarray, "kept 3"]:
+    """Cut a convex polygon off where normal · p < offset (Sutherland and Hodgman, 1974)."""
+    heights = polygon @ normal - offset
+    kept = []
+    for i in range(len(polygon)):
+        j = (i + 1) % len(polygon)
+        if heights[i] >= 0:
+            kept.append(polygon[i])
+        if heights[i] * heights[j] < 0:
+            share = heights[i] / (heights[i] - heights[j])
+            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
+    return np.array(kept).reshape(-1, 3)
 
 
-def image_in_space(
-    points: Float[np.ndarray, "*n 3"], walls: Sequence[PlaneWall], chain: Chain
-) -> Float[np.ndarray, "*n 3"]:
-    """Return where the raw image shows points that are seen over a chain. [m]."""
-    return folded_over(points, walls, chain[::-1])  # mirroring undoes itself
+def _beam_through(polygon: Float[np.ndarray, "corners 3"]) -> Float[np.ndarray, "sides 3"] | None:
+    """Return the inward normals of the beam from the array through a polygon; None: no beam."""
+    if len(polygon) < 3:
+        return None
+    middle = polygon.mean(axis=0)
+    sides = np.cross(polygon, np.roll(polygon, -1, axis=0))
+    sizes = np.linalg.norm(sides, axis=1)
+    sides = sides[sizes > 0] / sizes[sizes > 0, None]
+    depths = sides @ middle
+    if not sides.size or np.abs(depths).max() < EDGE_ON * np.linalg.norm(middle):
+        return None
+    inward: np.ndarray = sides * np.sign(depths[np.argmax(np.abs(depths))])
+    return inward
 
 
-def chains_in_space(walls: int, *, deepest: int) -> Iterator[Chain]:
-    """Yield all chains of one wall or more; none repeats a wall at once."""
-    for length in range(1, deepest + 1):
-        for chain in product(range(walls), repeat=length):
-            if all(one != other for one, other in pairwise(chain)):
-                yield chain
+def _plane_distance(polygon: Float[np.ndarray, "corners 3"]) -> float:
+    """Distance of a polygon's plane from the array: no part of it is nearer. [m]."""
+    normals = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0])
+    normal = normals[int(np.argmax(np.linalg.norm(normals, axis=1)))]
+    size = float(np.linalg.norm(normal))
+    return abs(float(polygon[0] @ normal)) / size if size > 0 else 0.0

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from estimator.geometry.flat_wall import GRAZING
+
 
 def unit_normal(
     start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
@@ -23,12 +25,46 @@ class Wall:
     covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
 
     @property
+    def point(self) -> Float[np.ndarray, " 3"]:
+        """Where it starts. [m]."""
+        return self.start
+
+    @property
     def normal(self) -> Float[np.ndarray, " 3"]:
         """Unit normal, to the right of start to end."""
         return unit_normal(self.start, self.end)
 
-    def moved(self, *, tilt: float, offset: float) -> "Wall":
+    def mirrored(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Mirror points about its line, whatever its extent. [m]."""
+        return mirrored(points, self.start, self.end)
+
+    def hit(
+        self, origin: Float[np.ndarray, " 3"], heading: Float[np.ndarray, " 3"]
+    ) -> tuple[float, float] | None:
+        """Return how far a ray goes to the wall, and to its nearer end from there. [m]."""
+        return crossing(origin, heading, self.start, self.end)
+
+    def hits(
+        self,
+        origins: Float[np.ndarray, "3 #rays"],
+        headings: Float[np.ndarray, "3 rays"],
+        limits: Float[np.ndarray, " rays"],
+    ) -> Float[np.ndarray, " rays"]:
+        """Return how far each ray goes to the upright wall; infinity if it does not meet it. [m].
+
+        The limits are those of the interface; of a segment, all crossings cost the same.
+        """
+        (nx, ny, _), (ax, ay, _) = self.normal, self.end - self.start
+        x, y = origins[0] - self.start[0], origins[1] - self.start[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = -(x * nx + y * ny) / (headings[0] * nx + headings[1] * ny)
+            share = x * ax + y * ay + distance * (headings[0] * ax + headings[1] * ay)
+        met = (distance > GRAZING) & (share >= 0) & (share <= ax * ax + ay * ay)
+        return np.where(met, distance, np.inf)
+
+    def moved(self, change: Float[np.ndarray, " 2"]) -> "Wall":
         """Turn the wall about its midpoint (counter-clockwise) and move it along its normal."""
+        tilt, offset = float(change[0]), float(change[1])
         middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
         cosine, sine = np.cos(tilt), np.sin(tilt)
         turned = np.array([cosine * half[0] - sine * half[1], sine * half[0] + cosine * half[1], 0])

@@ -1,6 +1,5 @@
 from .backprojection import backproject, focus, focus_uplink, prepare
 from .focusing import Focus, focus_within
-from .image_former import ImageFormer
 from .peak_detection import mean_background
 from .range_compression import RangeProfiles, range_profiles, unambiguous_path
 from .range_gating import gated
@@ -9,7 +8,6 @@ from .survey_3d import VolumeSurvey, lobe_origins, survey_volume
 
 __all__ = [
     "Focus",
-    "ImageFormer",
     "RangeProfiles",
     "Survey",
     "VolumeSurvey",

@@ -142,12 +142,11 @@ def _taper(
 ) -> tuple[Complex[np.ndarray, "channels freqs"], float]:
     if weights is None:
         return samples, float(samples.size)
-    try:
-        full = np.broadcast_to(weights, samples.shape)
-    except ValueError as error:
+    if any(size not in (1, full) for size, full in zip(weights.shape, samples.shape, strict=True)):
         raise MeasurementError(
             f"weights of shape {weights.shape} do not fit samples of shape {samples.shape}"
-        ) from error
+        )
+    full = np.broadcast_to(weights, samples.shape)
     gain = float(full.sum())
     if not gain > 0:
         raise MeasurementError(f"the weights sum to {gain:g}; a taper needs a positive sum")

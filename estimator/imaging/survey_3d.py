@@ -112,14 +112,7 @@ def survey_volume(echo: Echo, array: PlanarArray) -> VolumeSurvey:
         np.linspace(-sine, sine, 2 * max(1, int(np.ceil(sine / (step * beam)))) + 1)
         for beam in beams
     )
-    points = np.zeros((ranges.size, along.size, up.size, 3))
-    points[..., 0] = ranges[:, None, None] * along[:, None]
-    points[..., 2] = ranges[:, None, None] * up
-    ahead = np.maximum(1 - along[:, None] ** 2 - up**2, 0.0)
-    points[..., 1] = ranges[:, None, None] * np.sqrt(ahead)
-    values = np.zeros(points.shape[:-1], dtype=np.complex128)
-    seen = np.broadcast_to(ahead > LEAST_AHEAD, values.shape)
-    values[seen] = backproject(echo, points[seen], weights=survey_weights(echo))
+    points, values, seen = _imaged(echo, ranges, along, up)
     carrier = 4 * np.pi * float(echo.frequencies.mean()) / speed_of_light
     values *= np.exp(-1j * carrier * ranges)[:, None, None]
     intensity = np.abs(values) ** 2
@@ -139,6 +132,72 @@ def survey_volume(echo: Echo, array: PlanarArray) -> VolumeSurvey:
         peaks=peaks[~lobe],
         lobes=peaks[lobe],
     )
+
+
+def _imaged(
+    echo: Echo,
+    ranges: Float[np.ndarray, " ranges"],
+    along: Float[np.ndarray, " along"],
+    up: Float[np.ndarray, " up"],
+) -> tuple[
+    Float[np.ndarray, "ranges along up 3"],
+    Complex[np.ndarray, "ranges along up"],
+    Bool[np.ndarray, "ranges along up"],
+]:
+    """Image a polar grid; return its points [m], the values, and where there is an image."""
+    points = np.zeros((ranges.size, along.size, up.size, 3))
+    points[..., 0] = ranges[:, None, None] * along[:, None]
+    points[..., 2] = ranges[:, None, None] * up
+    ahead = np.maximum(1 - along[:, None] ** 2 - up**2, 0.0)
+    points[..., 1] = ranges[:, None, None] * np.sqrt(ahead)
+    values = np.zeros(points.shape[:-1], dtype=np.complex128)
+    seen = np.broadcast_to(ahead > LEAST_AHEAD, values.shape)
+    values[seen] = backproject(echo, points[seen], weights=survey_weights(echo))
+    return points, values, seen
+
+
+def peaks_around(
+    echo: Echo,
+    array: PlanarArray,
+    looked: VolumeSurvey,
+    heading: Float[np.ndarray, " 3"],
+    farthest: float,
+) -> Float[np.ndarray, "peaks 3"]:
+    """Find the peaks of the image around a direction beyond the angles without grating lobes.
+
+    There the image shows all that there is, and grating lobes of what is elsewhere besides. It
+    cannot tell that something stands there, but that nothing does.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+    array
+        Its extents.
+    looked
+        The survey: as wide a piece as that is imaged around the direction.
+    heading
+        Unit vector.
+    farthest
+        To which distance. [m]
+
+    Returns
+    -------
+    Peaks that no grating lobe explains, strongest first. [m]
+    """
+    ranges = looked.ranges[looked.ranges <= farthest]
+    if ranges.size < 2:
+        return np.zeros((0, 3))
+    along, up = heading[0] + looked.along, heading[2] + looked.up
+    points, values, _ = _imaged(echo, ranges, along, up)
+    intensity = np.abs(values) ** 2
+    strongest = float(np.max(np.abs(looked.values) ** 2))
+    threshold = peak_threshold(looked.background, strongest)
+    tops = (intensity == scipy.ndimage.maximum_filter(intensity, size=3)) & (intensity > threshold)
+    order = np.argsort(-intensity[tops], kind="stable")[:MOST_PEAKS]
+    peaks, levels = points[tops][order], intensity[tops][order]
+    real: np.ndarray = peaks[~brighter_elsewhere(echo, array, peaks, levels)]
+    return real
 
 
 def brighter_elsewhere(

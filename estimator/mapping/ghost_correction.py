@@ -1,13 +1,13 @@
 """Ghost correction: what the image shows behind mirrors is folded back to its true place."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from estimator.geometry.specular_chains_2d import Chain, image_over, possible_chains, seen_over
-from estimator.geometry.wall_2d import Wall
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.specular_chains import Chain, image_over, seen_over
 from estimator.imaging.focusing import Focus
 
 
@@ -23,9 +23,11 @@ class Folded:
 def corrected_image(
     focus: Focus,
     points: Float[np.ndarray, "*grid 3"],
-    walls: Sequence[Wall],
+    walls: Sequence[FlatWall],
+    chains: Iterable[Chain],
     *,
     raw: Complex[np.ndarray, "*grid"] | None = None,
+    skin: float = 0.0,
 ) -> Folded:
     """Focus the echo on points where things really are.
 
@@ -41,22 +43,27 @@ def corrected_image(
         Points in the array's frame. [m]
     walls
         All mirrors, at their true place.
+    chains
+        Over which anything may be seen, the empty one among them: what
+        :mod:`estimator.geometry.specular_chains_2d` or its twin in space gives.
     raw
         What is focused on the points themselves, if that is known already. [-]
+    skin
+        How thick the image of a wall is: so far behind it is still the wall itself. [m]
     """
     flat = points.reshape(-1, 3)
     values = np.zeros(len(flat), dtype=np.complex128)
     source = np.full(len(flat), -1, dtype=np.int64)
-    chains: list[Chain] = []
-    for chain in possible_chains(walls):
+    shown_over: list[Chain] = []
+    for chain in chains:
         images = image_over(flat, walls, chain)
-        seen = np.flatnonzero(seen_over(images, walls, chain))
+        seen = np.flatnonzero(seen_over(images, walls, chain, skin=skin))
         if not seen.size:
             continue
         shown = focus(images[seen]) if chain or raw is None else raw.ravel()[seen]
         brighter = (source[seen] < 0) | (np.abs(shown) > np.abs(values[seen]))
         values[seen[brighter]] = shown[brighter]
-        source[seen[brighter]] = len(chains)
-        chains.append(chain)
+        source[seen[brighter]] = len(shown_over)
+        shown_over.append(chain)
     grid = points.shape[:-1]
-    return Folded(values=values.reshape(grid), chains=tuple(chains), chain=source.reshape(grid))
+    return Folded(values=values.reshape(grid), chains=tuple(shown_over), chain=source.reshape(grid))

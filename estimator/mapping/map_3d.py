@@ -1,37 +1,29 @@
 """The map of a room in space: planes and targets at their true place, ghosts folded back."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.ndimage
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from estimator import false_alarm
-from estimator.array.planar_array import PlanarArray, planar_resolution
+from estimator.array.array_frame import ArrayFrame
+from estimator.array.planar_array import WIDEST_SINE, PlanarArray, planar_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
-from estimator.geometry.path_tracing_3d import folded_over
-from estimator.geometry.specular_chains_3d import (
-    Chain,
-    chains_in_space,
-    image_in_space,
-    seen_over_in_space,
-    unfolded_in_space,
-)
+from estimator.geometry.specular_chains import Chain, chain_to, unfolded_over
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
-from estimator.imaging.survey_3d import VolumeSurvey, survey_volume
+from estimator.geometry.wall_covariance import joint_covariance
+from estimator.imaging.survey_3d import VolumeSurvey, peaks_around, survey_volume
 from estimator.measurement.model import Echo
+from estimator.results.estimate import Mirror, Target
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
-from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall
+from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall, unassigned_peaks
 
 TARGET_LEVEL = 1e-3
 """Intensity, over that of the brightest target, of what still is one. [-]"""
 MOST_TARGETS = 24
-DEEPEST = 3
-"""Walls in a chain over which walls and targets are folded."""
-DEEPEST_IMAGE = 2
-"""The same of the corrected image's voxels."""
 STANDS_OUT = 25.0
 """Intensity over the background's that a target must reach: of pure background one voxel in 1e10
 does. [-]"""
@@ -59,7 +51,11 @@ class SpaceMap:
     planes: tuple[FittedPlane, ...]  # as the raw image shows them
     walls: tuple[PlaneWall, ...]  # the same at their true place
     seen_through: tuple[tuple[int, ...], ...]  # indices of walls, from the array outward
+    joint_covariance: Float[np.ndarray, "parameters parameters"]
+    """Of all walls' (two tilts [rad], offset [m]), one wall after the other."""
     targets: tuple[SpaceTarget, ...]  # strongest first
+    unassigned_peaks: Float[np.ndarray, "peaks 3"]
+    """Peaks on no wall and behind none, strongest first. [m]"""
     survey: VolumeSurvey
 
 
@@ -76,47 +72,50 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     looked = survey_volume(echo, array)
     coarse = coarse_resolution(planar_resolution(array, echo))
     planes, walls, seen = fold_planes(detect_planes(echo, array, looked).fitted, coarse)
+    joint = joint_covariance(
+        [plane.wall for plane in planes], seen, walls, reflected=mirrored_wall, change=plane_change
+    )
     return SpaceMap(
         planes=planes,
-        walls=walls,
+        walls=tuple(
+            replace(wall, covariance=joint[3 * i : 3 * i + 3, 3 * i : 3 * i + 3])
+            for i, wall in enumerate(walls)
+        ),
+        joint_covariance=joint,
+        unassigned_peaks=unassigned_peaks(looked.peaks, planes, coarse),
         seen_through=seen,
         targets=_targets(echo, array, looked, [plane.wall for plane in planes], walls),
         survey=looked,
     )
 
 
-def corrected_values(
-    looked: VolumeSurvey,
-    points: Float[np.ndarray, "*grid 3"],
-    walls: Sequence[PlaneWall],
-    *,
-    skin: float,
-) -> Complex[np.ndarray, "*grid"]:
-    """Read the survey on points where things really are.
-
-    A point that the array sees directly keeps its value, a hidden one has none; to either comes
-    what the raw image shows at its image over each chain of one or two walls, if the line there
-    passes over just these.
+def peaks_aside(
+    echo: Echo,
+    array: PlanarArray,
+    room: SpaceMap,
+    heading: Float[np.ndarray, " 3"],
+    farthest: float,
+) -> Float[np.ndarray, "peaks 3"] | None:
+    """Return peaks on no wall around a direction outside of the surveyed ones. [m].
 
     Parameters
     ----------
-    looked
-        The survey.
-    points
-        In the array's frame. [m]
-    walls
-        All mirrors, at their true place.
-    skin
-        How thick the image of a wall is: so far behind it is still the wall itself. [m]
+    echo, array
+        As the map was built from.
+    room
+        The map.
+    heading, farthest
+        As in :func:`estimator.imaging.survey_3d.peaks_around`.
+
+    Returns
+    -------
+    The peaks, strongest first; ``None`` if the direction is nearly in the array's plane.
     """
-    flat = points.reshape(-1, 3)
-    values = looked.at(flat)
-    values[unfolded_in_space(flat, walls, deepest=1, skin=skin)[1][:, 0] >= 0] = 0.0
-    for chain in chains_in_space(len(walls), deepest=DEEPEST_IMAGE):
-        images = image_in_space(flat, walls, chain)
-        seen = seen_over_in_space(images, walls, chain, skin=skin)
-        values[seen] += looked.at(images[seen])
-    return values.reshape(points.shape[:-1])
+    if max(abs(float(heading[0])), abs(float(heading[2]))) > WIDEST_SINE:
+        return None
+    peaks = peaks_around(echo, array, room.survey, heading, farthest)
+    coarse = coarse_resolution(planar_resolution(array, echo))
+    return unassigned_peaks(peaks, room.planes, coarse)
 
 
 def fold_planes(
@@ -146,7 +145,7 @@ def fold_planes(
     hidden = [plane for plane in planes if not any(plane is other for other in direct)]
     # A wall that others are seen over is nearer than they are: it is folded before them.
     for plane in sorted(hidden, key=lambda one: float(np.linalg.norm(one.wall.centre))):
-        chain = _chain_to(plane.wall.centre, walls)
+        chain = chain_to(plane.wall.centre, walls)
         folded = plane.wall
         for index in chain:
             folded = mirrored_wall(folded, walls[index])
@@ -158,10 +157,12 @@ def fold_planes(
     return tuple(ordered), tuple(walls), tuple(seen)
 
 
-def _chain_to(place: Float[np.ndarray, " 3"], walls: Sequence[PlaneWall]) -> Chain:
-    """Return the walls over which the array sees a point of its raw image."""
-    chain = unfolded_in_space(place[None], walls, deepest=DEEPEST)[1][0]
-    return tuple(int(index) for index in chain if index >= 0)
+def plane_change(new: PlaneWall, old: PlaneWall) -> Float[np.ndarray, " 3"]:
+    """Return (slopes along the axes, offset [m]) by which a plane left its old place."""
+    rise = float(new.normal @ old.normal)
+    slopes = -(old.axes @ new.normal) / rise
+    offset = float((new.centre - old.centre) @ new.normal) / rise
+    return np.array([*slopes, offset])
 
 
 def mirrored_wall(wall: PlaneWall, mirror: PlaneWall) -> PlaneWall:
@@ -255,11 +256,48 @@ def _target(
     axis = np.linalg.svd(spread * np.sqrt(weights)[:, None], full_matrices=False)[2][0]
     places = spread @ axis
     ends = ghost + np.array([[places.min()], [places.max()]]) * axis
-    through = _chain_to(ghost, walls)
+    through = chain_to(ghost, walls)
     return SpaceTarget(
-        position=folded_over(ghost, walls, through),
+        position=unfolded_over(ghost, walls, through),
         ghost=ghost,
         seen_through=through,
         level=float(intensity.max()),
-        ends=folded_over(ends, walls, through),
+        ends=unfolded_over(ends, walls, through),
+    )
+
+
+def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
+    """Return the walls of a map, as they are reported."""
+    mirrors = []
+    for plane, wall, through in zip(room.planes, room.walls, room.seen_through, strict=True):
+        places = (wall.corners - wall.centre) @ wall.axes.T
+        middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        sides = np.array([[places[:, 0].min(), middle[1]], [places[:, 0].max(), middle[1]]])
+        ends = frame.to_world(wall.centre + sides @ wall.axes)
+        mirrors.append(
+            Mirror(
+                start=ends[0],
+                end=ends[1],
+                normal=frame.turned_to_world(wall.normal),
+                covariance=wall.covariance,
+                confidence=plane.confidence,
+                level_db=float(10 * np.log10(plane.level / max(plane.background, 1e-300))),
+                seen_through=through,
+                corners=frame.to_world(wall.corners),
+            )
+        )
+    return tuple(mirrors)
+
+
+def targets_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Target, ...]:
+    """Return the targets of a map, as they are reported."""
+    return tuple(
+        Target(
+            position=frame.to_world(target.position),
+            ghost=frame.to_world(target.ghost),
+            seen_through=target.seen_through,
+            level_db=float(10 * np.log10(target.level)),
+            ends=frame.to_world(target.ends),
+        )
+        for target in room.targets
     )

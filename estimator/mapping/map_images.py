@@ -1,66 +1,42 @@
-"""The raw and the corrected image of a room, on one grid around what was found."""
+"""The raw and the corrected image of a room on one grid, in the plane or in space."""
 
-from collections.abc import Sequence
-
-import numpy as np
-from jaxtyping import Float
+from collections.abc import Iterable, Sequence
 
 from estimator.array.array_frame import ArrayFrame
-from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
-from estimator.imaging.backprojection import focus, prepare
-from estimator.imaging.range_compression import range_profiles
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.specular_chains import Chain
+from estimator.imaging.focusing import Focus
 from estimator.mapping.ghost_correction import corrected_image
-from estimator.mapping.map_2d import RoomMap
-from estimator.measurement.model import Echo
 from estimator.results.estimate import CorrectedImage, Image
 from estimator.results.pixel_grid import PixelGrid
 
-PIXELS = 2_000_000
-"""Most pixels of an image that is shown; its spacing grows beyond."""
-MARGIN = 0.05
-"""What an image shows around the outermost things in it. [m]."""
 
-
-def room_images(
-    echo: Echo,
-    room: RoomMap,
+def images_on(
+    grid: PixelGrid,
     frame: ArrayFrame,
-    paths: Sequence[Float[np.ndarray, "_ 3"]],
+    focus: Focus,
+    walls: Sequence[FlatWall],
+    chains: Iterable[Chain],
+    *,
+    skin: float = 0.0,
 ) -> tuple[Image, CorrectedImage]:
-    """Form the raw and the corrected image on one grid, around what was found."""
-    focuser = prepare(range_profiles(echo))
-    nearest, farthest = echo_reach(echo)
-    sine = imaged_sine(echo)
+    """Form both images: the second has each pixel's brightest view, directly or over walls.
 
-    def focus_in_reach(points: Float[np.ndarray, "*grid 3"]) -> np.ndarray:
-        """Focus where range and angle are unambiguous; elsewhere there is no image: 0."""
-        distance = np.linalg.norm(points, axis=-1)
-        inside = (distance > nearest) & (distance < farthest)
-        inside &= (points[..., 1] > 0) & (np.abs(points[..., 0]) < sine * distance)
-        values = np.zeros(points.shape[:-1], dtype=np.complex128)
-        values[inside] = focus(focuser, points[inside])
-        return values
-
-    shown = [np.zeros((1, 3)), echo.positions, room.survey.peaks, *paths]
-    shown += [np.stack([wall.start, wall.end]) for wall in room.walls]
-    shown += [np.stack([target.position, target.ghost]) for target in room.targets]
-    grid = _grid(frame.to_world(np.concatenate(shown)), echo_resolution(echo).along_ray)
+    Parameters
+    ----------
+    grid
+        In the world's frame. [m]
+    frame
+        The array's.
+    focus
+        Focuses the echo on points of the array's frame; 0 where there is no image.
+    walls, chains, skin
+        As in :func:`estimator.mapping.ghost_correction.corrected_image`.
+    """
     points = frame.to_local(grid.points)
-    raw = Image(values=focus_in_reach(points), grid=grid)
-    folded = corrected_image(focus_in_reach, points, room.walls, raw=raw.values)
+    raw = Image(values=focus(points), grid=grid)
+    folded = corrected_image(focus, points, walls, chains, raw=raw.values, skin=skin)
     corrected = CorrectedImage(
         values=folded.values, grid=grid, chains=folded.chains, chain=folded.chain
     )
     return raw, corrected
-
-
-def _grid(shown: Float[np.ndarray, "points 3"], cell: float) -> PixelGrid:
-    """Cover all points that are to be seen, with two pixels a range cell if affordable."""
-    low, high = shown.min(axis=0) - MARGIN, shown.max(axis=0) + MARGIN
-    spacing = max(0.5 * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
-    return PixelGrid.spanning(
-        x=(float(low[0]), float(high[0])),
-        y=(float(low[1]), float(high[1])),
-        z=float(shown[:, 2].mean()),
-        spacing=spacing,
-    )

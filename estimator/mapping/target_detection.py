@@ -10,12 +10,19 @@ from scipy.ndimage import label
 from estimator.array.resolution import HALF_POWER
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER
-from estimator.geometry.specular_chains_2d import image_over, possible_chains, seen_over, unfolded
-from estimator.geometry.wall_2d import Wall, crossing, mirrored, unit_normal
+from estimator.geometry.specular_chains import (
+    image_over,
+    seen_over,
+    unfolded,
+    unfolded_over,
+)
+from estimator.geometry.specular_chains_2d import possible_chains
+from estimator.geometry.wall_2d import Wall, crossing, unit_normal
+from estimator.geometry.wall_covariance import place_covariance
 from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.survey_2d import Survey
 from estimator.mapping.diffuse_multipath import between, in_cloud
-from estimator.mapping.wall_unfolding import FoldedWalls, place_covariance
+from estimator.mapping.wall_unfolding import FoldedWalls
 from estimator.results.estimate import Target
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_relations import BEYOND_END, lies_on
@@ -276,8 +283,7 @@ def _target(spot: Spot, folded: FoldedWalls, resolution: Resolution) -> Target:
     chain = tuple(int(index) for index in chains[0] if index >= 0)
     ends = spot.ends
     if ends is not None:  # over the same mirrors, whatever their extent
-        for index in chain:
-            ends = mirrored(ends, folded.walls[index].start, folded.walls[index].end)
+        ends = unfolded_over(ends, folded.walls, chain)
     reach = float(np.linalg.norm(spot.place))
     ray = spot.place / reach
     across = unit_normal(np.zeros(3), spot.place)
@@ -294,7 +300,7 @@ def _target(spot: Spot, folded: FoldedWalls, resolution: Resolution) -> Target:
         position=places[0],
         ghost=spot.place,
         seen_through=chain,
-        covariance=place_covariance(spot.place, own, folded, chain),
+        covariance=place_covariance(spot.place, own, folded.walls, folded.covariance, chain),
         level_db=float(10 * np.log10(spot.intensity)),
         ends=ends,
     )
@@ -371,7 +377,8 @@ def _is_mixed(
     target: Target, targets: Sequence[Target], walls: Sequence[Wall], coarse: Resolution
 ) -> bool:
     """Tell whether a target is a stronger one seen one way on the way out, another way back."""
-    chains = [chain for chain in possible_chains(walls, deepest=2)]
+    reach = 2 * float(np.linalg.norm(target.ghost))  # the mean of two ranges is the target's
+    chains = list(possible_chains(walls, reach=reach))
     for other in targets:
         if (other.level_db or 0.0) <= (target.level_db or 0.0):
             continue

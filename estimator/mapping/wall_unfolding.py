@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.array.resolution_cell import Resolution
-from estimator.geometry.specular_chains_2d import DEEPEST, Chain, unfolded
+from estimator.geometry.specular_chains import LONGEST_CHAIN, Chain, unfolded
 from estimator.geometry.wall_2d import Wall, crossing, mirrored
+from estimator.geometry.wall_covariance import joint_covariance
 from estimator.mapping.diffuse_multipath import between
 from estimator.walls.fitted_line import FittedLine
 
@@ -24,8 +25,6 @@ SAME_PLACE = 3.0
 """Cells within which a folded line and a wall that is seen otherwise are one."""
 MIXED_SAMPLES = 65
 """Places along a wall whose two views are mixed: closer than the cells of the mixture."""
-STEP = 1e-6
-"""Of the numerical derivatives. [rad], [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +64,7 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
         folded = _folded(line, walls, chain)
         if chain:
             views.append((line, folded))
-        if len(chain) == DEEPEST or any(_is_one(line, folded, w, resolution) for w in walls):
+        if len(chain) == LONGEST_CHAIN or any(_is_one(line, folded, w, resolution) for w in walls):
             continue
         kept.append(line)
         walls.append(folded)
@@ -75,7 +74,10 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
     lines = tuple(kept[i] for i in order)
     chains = tuple(tuple(place[i] for i in seen[old]) for old in order)
     nominal = [walls[i] for i in order]
-    joint = _joint_covariance(lines, nominal, chains)
+    seen_walls = [
+        Wall(start=line.start, end=line.end, covariance=line.covariance) for line in lines
+    ]
+    joint = joint_covariance(seen_walls, chains, nominal, reflected=_reflected, change=_change)
     return FoldedWalls(
         lines=lines,
         walls=tuple(
@@ -164,97 +166,14 @@ def _is_one(line: FittedLine, folded: Wall, other: Wall, resolution: Resolution)
     return bool(np.mean(beside & inside) > 0.5)
 
 
-def _joint_covariance(
-    lines: Sequence[FittedLine], walls: Sequence[Wall], chains: Sequence[Chain]
-) -> Float[np.ndarray, "parameters parameters"]:
-    """Propagate the lines' own covariances, which are independent, to the folded walls."""
-    size = 2 * len(lines)
-    own = np.zeros((size, size))
-    change = np.zeros((size, size))
-    for i, line in enumerate(lines):
-        own[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = line.covariance
-        for j in range(2):
-            moves = []
-            for sign in (STEP, -STEP):
-                shift = np.zeros((len(lines), 2))
-                shift[i, j] = sign
-                moves.append(_moves(_refolded(lines, chains, shift), walls))
-            change[:, 2 * i + j] = (moves[0] - moves[1]).ravel() / (2 * STEP)
-    joint: np.ndarray = change @ own @ change.T
-    return joint
+def _reflected(wall: Wall, mirror: Wall) -> Wall:
+    ends = mirrored(np.stack([wall.start, wall.end]), mirror.start, mirror.end)
+    return Wall(start=ends[0], end=ends[1], covariance=wall.covariance)
 
 
-def _refolded(
-    lines: Sequence[FittedLine], chains: Sequence[Chain], shift: Float[np.ndarray, "lines 2"]
-) -> list[Wall]:
-    """Fold lines that are turned and moved a little; a chain's mirrors come before its wall."""
-    walls: list[Wall] = []
-    for line, chain, (tilt, offset) in zip(lines, chains, shift, strict=True):
-        seen = Wall(start=line.start, end=line.end, covariance=line.covariance)
-        moved = seen.moved(tilt=float(tilt), offset=float(offset))
-        walls.append(_folded(replace(line, start=moved.start, end=moved.end), walls, chain))
-    return walls
-
-
-def _moves(moved: Sequence[Wall], walls: Sequence[Wall]) -> Float[np.ndarray, "walls 2"]:
-    """Return by what each wall was turned, and moved along its normal at its midpoint."""
-    result = []
-    for new, old in zip(moved, walls, strict=True):
-        along = (old.end - old.start) / np.linalg.norm(old.end - old.start)
-        turned = (new.end - new.start) / np.linalg.norm(new.end - new.start)
-        tilt = along[0] * turned[1] - along[1] * turned[0]
-        result.append((tilt, float((new.start - 0.5 * (old.start + old.end)) @ new.normal)))
-    return np.array(result).reshape(-1, 2)
-
-
-def place_covariance(
-    ghost: Float[np.ndarray, " 3"],
-    covariance: Float[np.ndarray, "3 3"],
-    folded: FoldedWalls,
-    chain: Chain,
-) -> Float[np.ndarray, "3 3"]:
-    """Propagate the covariance of a place in the image, and of the mirrors, to its true place.
-
-    Parameters
-    ----------
-    ghost
-        Where the image shows it. [m]
-    covariance
-        Of that place. [m²]
-    folded
-        The walls.
-    chain
-        The mirrors over which it is seen.
-
-    Returns
-    -------
-    Covariance of the folded place. [m²]
-    """
-
-    def fold(walls: Sequence[Wall], point: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-        for index in chain:
-            point = mirrored(point, walls[index].start, walls[index].end)
-        return point
-
-    turn = np.stack(
-        [fold(folded.walls, ghost + axis) - fold(folded.walls, ghost) for axis in np.eye(3)],
-        axis=-1,
-    )
-    total = turn @ covariance @ turn.T
-    parameters = [2 * index + part for index in sorted(set(chain)) for part in (0, 1)]
-    columns = []
-    for parameter in parameters:
-        ends = []
-        for step in (STEP, -STEP):
-            walls = list(folded.walls)
-            shift = {"tilt": 0.0, "offset": 0.0}
-            shift["tilt" if parameter % 2 == 0 else "offset"] = step
-            walls[parameter // 2] = walls[parameter // 2].moved(**shift)
-            ends.append(fold(walls, ghost))
-        columns.append((ends[0] - ends[1]) / (2 * STEP))
-    if columns:
-        by_walls = np.stack(columns, axis=-1)
-        block = folded.covariance[np.ix_(parameters, parameters)]
-        total = total + by_walls @ block @ by_walls.T
-    result: np.ndarray = total
-    return result
+def _change(new: Wall, old: Wall) -> Float[np.ndarray, " 2"]:
+    """Return by what a wall was turned, and moved along its normal at its midpoint."""
+    along = (old.end - old.start) / np.linalg.norm(old.end - old.start)
+    turned = (new.end - new.start) / np.linalg.norm(new.end - new.start)
+    tilt = along[0] * turned[1] - along[1] * turned[0]
+    return np.array([tilt, float((new.start - 0.5 * (old.start + old.end)) @ new.normal)])

@@ -1,12 +1,17 @@
+from .decision_rules import decide
 from .diffuse_fallback import with_diffuse_search
 from .diffuse_positioning import SeenWall, search_diffuse
-from .position_decision_2d import decide
-from .position_decision_3d import decide_in_space
+from .map_context import MapContext, no_image
+from .weighted_least_squares import Consensus, Sighting, solve_position
 
 __all__ = [
+    "Consensus",
+    "MapContext",
     "SeenWall",
+    "Sighting",
     "decide",
-    "decide_in_space",
+    "no_image",
     "search_diffuse",
+    "solve_position",
     "with_diffuse_search",
 ]

@@ -8,7 +8,8 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
-from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.bearing_2d import LINEAR
+from estimator.geometry.path_tracing import trace
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_positioning import DiffuseFix, SeenWall, search_diffuse
@@ -119,11 +120,10 @@ def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) ->
     wall = walls[fix.wall]
     middle = 0.5 * (wall.true.start + wall.true.end)
     ghost = 0.5 * (wall.seen.start + wall.seen.end)
-    way = project(
-        float(np.arctan2(ghost[1], ghost[0])),
+    way, _, _ = trace(
+        LINEAR.towards(LINEAR.of(ghost)),
         float(np.linalg.norm(ghost)),
         [walls[index].true for index in wall.through],
-        covariance=np.zeros((2, 2)),
     )
     return UserEstimate(
         name=answer.name,
@@ -131,7 +131,7 @@ def _placed(answer: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall]) ->
         position=fix.position,
         covariance=fix.covariance + _of_the_wall(fix.position, wall.true),
         bounces=len(wall.through) + 1,
-        path=np.vstack([way.path[:-1], middle, fix.position]),  # over the middle of the wall
+        path=np.vstack([way[:-1], middle, fix.position]),  # over the middle of the wall
         line_of_sight=False,
         paths=tuple(
             replace(path, used=False, reason="what the wall scatters comes from elsewhere")

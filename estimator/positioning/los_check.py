@@ -11,11 +11,13 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.array.resolution_cell import Resolution
-from estimator.geometry.path_tracing_2d import project
-from estimator.geometry.wall_2d import Wall, crossing, unit_normal
-from estimator.positioning.map_context import Surroundings
+from estimator.channel.path import Wave
+from estimator.geometry.bearing import Bearing
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.path_tracing import project
+from estimator.positioning.map_context import MapContext
+from estimator.positioning.unseen_mirrors import wall_between
 from estimator.results.estimate import UserEstimate
-from estimator.wavefronts.wave_fit_2d import SphericalWave
 
 LOOSE_PEAKS = 12
 """Strongest loose peaks between which an unseen wall is suspected."""
@@ -23,9 +25,6 @@ BESIDE = 2.0
 """Cells beside a ray within which a peak stands on it. [-]."""
 USER_SIZE = 0.05
 """How far before the end of a path the user itself may echo. [m]."""
-PEAK_DEVIATION = 0.5
-"""Of an end's peak along a wall's normal: pixels are 0.75 cells apart, and waves bent by an edge
-come from beside it. [cells]"""
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
@@ -34,7 +33,7 @@ rest is margin for walls that are farther or smoother. [-]"""
 
 
 def doubt_straight_way(
-    answer: UserEstimate, wave: SphericalWave, room: Surroundings
+    answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing
 ) -> UserEstimate:
     """Doubt a straight way on which something may stand that is no wall the image knows.
 
@@ -46,14 +45,25 @@ def doubt_straight_way(
         That came over it.
     room
         What the image shows.
+    how
+        What the array measures of a direction.
 
     Returns
     -------
     The answer, or that it is ambiguous and why, with the place over an unseen wall.
     """
-    mirror = unseen_mirror(wave.aoa, wave.path_length, room.unassigned_peaks, room.resolution)
+    heading, length = how.towards(wave.bearing), wave.path_length
+    shown = room.shows(heading)
+    peaks = [room.unassigned_peaks]
+    if not shown and room.aside is not None:
+        # An image beyond the angles without grating lobes has more in it than there is, not less.
+        aside = room.aside(heading, length)
+        if aside is not None:
+            peaks, shown = [aside, *peaks], True
+    loose = np.concatenate([some[:LOOSE_PEAKS] for some in peaks])
+    mirror = unseen_mirror(heading, length, loose, room.resolution, how)
     if mirror is not None:
-        place = project(wave.aoa, wave.path_length, [mirror], covariance=wave.covariance)
+        place = project(how, wave.bearing, length, [mirror], covariance=wave.covariance)
         other = replace(
             answer,
             status="ambiguous",
@@ -70,27 +80,28 @@ def doubt_straight_way(
             other,
         )
     thing = what_stands_in_the_way(
-        wave.aoa, wave.path_length, room.unassigned_peaks, room.resolution.across_ray
+        heading, length, np.concatenate(peaks), room.resolution.across_ray
     )
     if thing is not None:
+        where = ", ".join(f"{thing[axis]:.3f}" for axis in how.coordinates)
         return _doubted(
             answer,
-            f"something stands on the straight way at ({thing[0]:.3f}, {thing[1]:.3f}) m: "
+            f"something stands on the straight way at ({where}) m: "
             "if it is a mirror too short to be told as one, the user is elsewhere",
         )
     if room.imaged and not room.walls and hides_walls(room.contrast):
         return _doubted(answer, too_noisy(room.contrast))
-    if wave.path_length > room.reach:
+    if length > room.reach:
         return _doubted(
             answer,
-            f"the straight way is {wave.path_length:.2f} m long, and the image shows what "
+            f"the straight way is {length:.2f} m long, and the image shows what "
             f"stands on it to {room.reach:.2f} m only; take smaller frequency steps",
         )
-    if abs(np.cos(wave.aoa)) > room.widest:
+    if not shown:
         return _doubted(
             answer,
             f"the image does not show what stands on the straight way at "
-            f"{np.degrees(wave.aoa):.1f}°, but only what is within "
+            f"{how.told(wave.bearing)}, but only what is within "
             f"{np.degrees(np.arcsin(room.widest)):.1f}° of boresight",
         )
     return answer
@@ -123,61 +134,54 @@ def _doubted(answer: UserEstimate, reason: str, *others: UserEstimate) -> UserEs
 
 
 def unseen_mirror(
-    aoa: float,
+    heading: Float[np.ndarray, " 3"],
     path_length: float,
     unassigned_peaks: Float[np.ndarray, "peaks 3"],
     resolution: Resolution,
-) -> Wall | None:
+    how: Bearing,
+) -> FlatWall | None:
     """Return a wall between two loose points that the ray meets before its end, if there is one.
 
     Parameters
     ----------
-    aoa, path_length
-        Of the ray from the origin. [rad], [m]
-    loose
-        Peaks of the image that lie on no wall, strongest first. [m]
+    heading, path_length
+        Of the ray from the origin. [-], [m]
+    unassigned_peaks
+        The strongest peaks of the image that lie on no wall. [m]
     resolution
         Of the image: the peaks are known to a part of a cell, and so is the wall.
+    how
+        What the array measures of a direction.
     """
-    points = unassigned_peaks[:LOOSE_PEAKS]
-    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
+    points = unassigned_peaks
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
-        hit = crossing(np.zeros(3), towards, points[first], points[second])
+        wall = wall_between(points[first], points[second], resolution, how)
+        hit = None if wall is None else wall.hit(np.zeros(3), heading)
         if hit is not None and hit[0] < path_length:
-            return _wall_between(points[first], points[second], resolution)
+            return wall
     return None
 
 
-def _wall_between(
-    start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"], resolution: Resolution
-) -> Wall:
-    """Return the wall whose two ends are peaks, with the covariance of their pixels."""
-    normal, length = unit_normal(start, end), float(np.linalg.norm(end - start))
-    ends = np.stack([start, end])
-    variances = (PEAK_DEVIATION * resolution.cell(ends, normal)) ** 2
-    # The end moving along the normal by δ turns the line by −δ over its length, the start by δ.
-    changes = np.array([[1 / length, -1 / length], [0.5, 0.5]])
-    return Wall(start=start, end=end, covariance=changes * variances @ changes.T)
-
-
 def what_stands_in_the_way(
-    aoa: float, path_length: float, unassigned_peaks: Float[np.ndarray, "peaks 3"], cell: float
+    heading: Float[np.ndarray, " 3"],
+    path_length: float,
+    unassigned_peaks: Float[np.ndarray, "peaks 3"],
+    cell: float,
 ) -> Float[np.ndarray, " 3"] | None:
     """Return the strongest loose point that stands on the ray before its end, if there is one.
 
     Parameters
     ----------
-    aoa, path_length
-        Of the ray from the origin. [rad], [m]
-    loose
+    heading, path_length
+        Of the ray from the origin. [-], [m]
+    unassigned_peaks
         Peaks of the image that lie on no wall, strongest first. [m]
     cell
         Resolution of the image across a ray, as an angle. [rad]
     """
     if not len(unassigned_peaks):
         return None
-    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    ahead = unassigned_peaks @ towards
-    beside = np.linalg.norm(unassigned_peaks - ahead[:, None] * towards, axis=-1)
+    ahead = unassigned_peaks @ heading
+    beside = np.linalg.norm(unassigned_peaks - ahead[:, None] * heading, axis=-1)
     on_it = (ahead > 0) & (ahead < path_length - USER_SIZE) & (beside < BESIDE * cell * ahead)
     return unassigned_peaks[int(np.argmax(on_it))] if on_it.any() else None

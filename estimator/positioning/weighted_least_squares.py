@@ -1,10 +1,11 @@
-r"""One position from several paths: joint least squares over angles, delays and curvatures.
+r"""One position from several paths: joint least squares over bearings, delays and curvatures.
 
 A path over the mirrors of a chain shows the user's image p = A u + t: the user u mirrored about
-each of them, the last one first. The path's angle is that of p, its length |p|, and so is the
-radius of its wavefront; a user's clock that is ahead by δ makes all lengths seem shorter by cδ:
+each of them, the last one first. The path's bearing (an angle in the plane, two cosines in space)
+is that of p, its length |p|, and so is the radius of its wavefront; a user's clock that is ahead
+by δ makes all lengths seem shorter by cδ:
 
-.. math:: \theta = \arg p, \qquad R = |p| - c \delta, \qquad R_c = |p| .
+.. math:: b = b(p), \qquad R = |p| - c \delta, \qquad \kappa = 1 / |p| .
 
 Walls are uncertain too: with their parameters' covariance :math:`C_w` and the observations'
 slopes H over these, errors of all paths have the covariance :math:`C + H C_w H^T`. Paths over
@@ -19,17 +20,21 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
-from estimator.geometry.wall_2d import Wall, mirrored
+from estimator import false_alarm
+from estimator.geometry.bearing import Bearing
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.path_tracing import slopes_by_wall
+from estimator.geometry.specular_chains import Chain, image_over, unfolded_over
 
 ROUNDS = 2
 """How often the walls' part of the covariance is taken at the place found. [-]."""
 ITERATIONS = 20
 CONVERGED = 1e-12
 """Step that ends an iteration. [m]."""
-STEP = 1e-6
-"""Of the derivatives by a wall's parameters. [rad], [m]."""
-AGREE = 0.999
+AGREE = 1 - false_alarm.DISAGREEMENT
 """Probability with which true paths pass the test that they agree."""
+FLATTEST = 1e-3
+"""Least curvature from which a search for a user's place is begun. [1/m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +42,7 @@ class Sighting:
     """A path that is taken to come over a chain of mirrors."""
 
     path: int  # its index
-    chain: tuple[int, ...]  # of walls, from the array outward
+    chain: Chain  # of walls, from the array outward
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,20 +63,15 @@ class Consensus:
         return self.freedom == 0 or self.chi_square < float(chi2.ppf(AGREE, self.freedom))
 
 
-def block_covariance(walls: Sequence[Wall]) -> Float[np.ndarray, "parameters parameters"]:
-    """Put the covariances of walls that were seen independently into one matrix."""
-    joint = np.zeros((2 * len(walls), 2 * len(walls)))
-    for index, wall in enumerate(walls):
-        joint[2 * index : 2 * index + 2, 2 * index : 2 * index + 2] = wall.covariance
-    return joint
-
-
 def solve_position(
     sightings: Sequence[Sighting],
     observed: Float[np.ndarray, "paths kinds"],
     covariance: Float[np.ndarray, "observations observations"],
-    walls: Sequence[Wall],
+    walls: Sequence[FlatWall],
     wall_covariance: Float[np.ndarray, "parameters parameters"],
+    *,
+    how: Bearing,
+    clock_known: bool = True,
 ) -> Consensus:
     """Find the position that explains some paths best.
 
@@ -80,114 +80,118 @@ def solve_position(
     sightings
         The paths, and the mirrors of each.
     observed
-        Of all paths: angle and length, if the clock is known; angle, length and radius of
-        curvature, if its offset is to be found as well. [rad], [m]
+        Of all paths: bearing and length, if the clock is known; bearing, length and curvature, if
+        its offset is to be found as well. [rad] or [-], [m], [1/m]
     covariance
         Of all of them, path after path.
     walls
         All mirrors, at their true place.
     wall_covariance
-        Of (angle, offset) of all of them, wall after wall.
+        Of (tilts, offset) of all of them, wall after wall.
+    how
+        What the array measures of a direction.
+    clock_known
+        Whether a delay is a length.
     """
     kinds = observed.shape[1]
-    unknown_clock = kinds == 3
+    angles = kinds - (1 if clock_known else 2)
     rows = np.concatenate([kinds * one.path + np.arange(kinds) for one in sightings])
     values = observed.ravel()[rows]
     first = sightings[0]
-    start = _image_folded(observed[first.path], [walls[i] for i in first.chain])
-    offset = float(observed[first.path, -1] - observed[first.path, 1]) if unknown_clock else 0.0
-    unknowns = np.array([*start, *([offset] if unknown_clock else [])])
+    seen = observed[first.path]
+    distance = float(seen[-1]) if clock_known else 1 / max(float(seen[-1]), FLATTEST)
+    start = unfolded_over(distance * how.towards(seen[:angles]), walls, first.chain)
+    axes = how.coordinates
+    unknowns = start[axes]
+    farthest = float(np.linalg.norm(unknowns))
+    if not clock_known:
+        unknowns = np.append(unknowns, distance - seen[angles])
     for _ in range(ROUNDS):
-        by_walls = _wall_slopes(sightings, unknowns[:2], walls, kinds)
+        by_walls = _wall_slopes(sightings, _place(unknowns, axes), walls, how, kinds)
         total = covariance[np.ix_(rows, rows)] + by_walls @ wall_covariance @ by_walls.T
         # Scaled to like units, so that its square root is exact to rounding.
         scale = np.sqrt(np.diag(total))
         root = np.linalg.cholesky(total / np.outer(scale, scale))
         for _ in range(ITERATIONS):
-            predicted, slopes = _predicted(sightings, unknowns, walls, kinds)
-            left = values - predicted
-            angles = np.arange(0, len(left), kinds)
-            left[angles] = (left[angles] + np.pi) % (2 * np.pi) - np.pi
+            predicted, slopes = _predicted(sightings, unknowns, walls, how, kinds)
+            left = (values - predicted).reshape(-1, kinds)
+            left[:, :angles] = how.wrapped(left[:, :angles])
             weighted = np.linalg.solve(root, slopes / scale[:, None])
-            errors = np.linalg.solve(root, left / scale)
+            errors = np.linalg.solve(root, left.ravel() / scale)
             step = np.linalg.lstsq(weighted, errors)[0]
+            # Far from the place the linear model overshoots: never by more than the way there.
+            step = step / max(1.0, float(np.linalg.norm(step[: len(axes)])) / farthest)
             unknowns = unknowns + step
             if np.linalg.norm(step) < CONVERGED:
                 break
     spread = np.linalg.inv(weighted.T @ weighted)
     square = np.zeros((3, 3))
-    square[:2, :2] = spread[:2, :2]
+    square[np.ix_(axes, axes)] = spread[: len(axes), : len(axes)]
     rest = errors - weighted @ step
     return Consensus(
         sightings=tuple(sightings),
-        position=np.append(unknowns[:2], 0.0),
+        position=_place(unknowns, axes),
         covariance=square,
         chi_square=float(rest @ rest),
         freedom=len(values) - len(unknowns),
-        clock_offset=float(unknowns[2]) / speed_of_light if unknown_clock else None,
-        clock_deviation=float(np.sqrt(spread[2, 2])) / speed_of_light if unknown_clock else None,
+        clock_offset=None if clock_known else float(unknowns[-1]) / speed_of_light,
+        clock_deviation=None if clock_known else float(np.sqrt(spread[-1, -1])) / speed_of_light,
     )
 
 
-def _image_folded(
-    observed: Float[np.ndarray, " kinds"], chain: Sequence[Wall]
-) -> Float[np.ndarray, " 2"]:
-    """Fold the image that one path shows back to the user. [m]."""
-    place = observed[-1] * np.array([np.cos(observed[0]), np.sin(observed[0]), 0.0])
-    for wall in chain:
-        place = mirrored(place, wall.start, wall.end)
-    folded: np.ndarray = place[:2]
-    return folded
+def _place(unknowns: Float[np.ndarray, " unknowns"], axes: list[int]) -> Float[np.ndarray, " 3"]:
+    place = np.zeros(3)
+    place[axes] = unknowns[: len(axes)]
+    return place
 
 
 def _predicted(
     sightings: Sequence[Sighting],
     unknowns: Float[np.ndarray, " unknowns"],
-    walls: Sequence[Wall],
+    walls: Sequence[FlatWall],
+    how: Bearing,
     kinds: int,
 ) -> tuple[Float[np.ndarray, " observations"], Float[np.ndarray, "observations unknowns"]]:
     """Return what the paths should show, and its slopes."""
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    points[:, :2] += unknowns[:2]
-    offset = float(unknowns[2]) if kinds == 3 else 0.0
+    axes = how.coordinates
+    place = _place(unknowns, axes)
+    points = np.vstack([place, place + np.eye(3)[axes]])
+    clock = unknowns[len(axes) :]  # empty, if it is known
     values, slopes = [], []
     for one in sightings:
-        images = points
-        for index in reversed(one.chain):
-            images = mirrored(images, walls[index].start, walls[index].end)
-        image, turned = images[0, :2], (images[1:] - images[0])[:, :2]  # mirrors are linear
+        images = image_over(points, walls, one.chain)
+        image, turned = images[0, axes], (images[1:] - images[0])[:, axes]  # mirrors are linear
         length = float(np.linalg.norm(image))
-        along = image / length
-        by_place = [turned @ [-along[1], along[0]] / length, turned @ along, turned @ along]
-        values += [np.arctan2(image[1], image[0]), length - offset, length][:kinds]
-        by_clock = [[], [], []] if kinds == 2 else [[0.0], [-1.0], [0.0]]
-        slopes += [[*by_place[i], *by_clock[i]] for i in range(kinds)]
+        ray = image / length
+        by_length = turned @ ray
+        by_place = [turned @ turn / length for turn in how.turns(ray)]
+        by_place += [by_length, -by_length / length**2]
+        by_clock = np.zeros((len(by_place), clock.size))
+        by_clock[-2:-1] = -1.0
+        shown = [*how.of(images[0]), length - float(clock.sum()), 1 / length]
+        values += shown[:kinds]
+        slopes += [np.append(*both) for both in zip(by_place, by_clock, strict=True)][:kinds]
     return np.array(values), np.array(slopes)
 
 
 def _wall_slopes(
     sightings: Sequence[Sighting],
-    place: Float[np.ndarray, " 2"],
-    walls: Sequence[Wall],
+    user: Float[np.ndarray, " 3"],
+    walls: Sequence[FlatWall],
+    how: Bearing,
     kinds: int,
 ) -> Float[np.ndarray, "observations parameters"]:
-    """Differentiate what the paths show by (angle, offset) of all walls, the user held."""
-    user = np.append(place, 0.0)
-    slopes = np.zeros((kinds * len(sightings), 2 * len(walls)))
+    """Differentiate what the paths show by (tilts, offset) of all walls, the user held."""
+    ends = np.cumsum([0, *(len(wall.covariance) for wall in walls)])
+    slopes = np.zeros((kinds * len(sightings), ends[-1]))
     for row, one in enumerate(sightings):
+
+        def shown(moved: Sequence[FlatWall], chain: Chain = one.chain) -> np.ndarray:
+            image = image_over(user, moved, chain)
+            length = float(np.linalg.norm(image))
+            return np.array([*how.of(image), length, 1 / length])[:kinds]
+
         for index in set(one.chain):
-            for column, unit in enumerate(STEP * np.eye(2)):
-                ends = []
-                for sign in (1.0, -1.0):
-                    shifted = list(walls)
-                    shifted[index] = walls[index].moved(
-                        tilt=float(sign * unit[0]), offset=float(sign * unit[1])
-                    )
-                    image = user
-                    for back in reversed(one.chain):
-                        image = mirrored(image, shifted[back].start, shifted[back].end)
-                    length = float(np.linalg.norm(image))
-                    ends.append(np.array([np.arctan2(image[1], image[0]), length, length]))
-                change = (ends[0] - ends[1])[:kinds] / (2 * STEP)
-                slopes[kinds * row : kinds * (row + 1), 2 * index + column] = change
+            columns = slice(ends[index], ends[index + 1])
+            slopes[kinds * row : kinds * (row + 1), columns] = slopes_by_wall(shown, walls, index)
     return slopes

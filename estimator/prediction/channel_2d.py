@@ -1,6 +1,6 @@
 r"""A user's channel, predicted from the map: the paths, with angle, delay and level.
 
-The line of sight, up to three mirrors by the method of images, and one scattering by a target.
+The line of sight, mirrors by the method of images, and one scattering by a target.
 Extents are finite, and what another wall hides is left out. The inputs are estimates; their
 covariances are carried to each path's angle and length to first order. A position that was itself
 found over a wall errs together with that wall, and the path that it came from is better known
@@ -26,12 +26,14 @@ from estimator.geometry.path_covariance import (
     polar_slopes,
     rests_on,
 )
-from estimator.geometry.specular_chains_2d import Chain, image_over, possible_chains
+from estimator.geometry.specular_chains import Chain, checked_bounces, image_over
+from estimator.geometry.specular_chains_2d import possible_chains
 from estimator.geometry.wall_2d import Wall, crossing, mirrored
 from estimator.prediction.wall_reflection import Reflections, wall_reflections
 from estimator.results.estimate import Estimate, Target, UserEstimate
 
-MOST_BOUNCES = 3
+USUAL_BOUNCES = 3
+"""Mirrors in a chain unless asked for more: three take 18 dB, as walls are taken to reflect."""
 SCATTER_DEVIATION_DB = 6.0
 """How far a target's cross-section towards the user may be from that of its echo: over angles,
 that of a few scattering centres is exponential, 5.6 dB in decibels (Swerling 1). [dB]"""
@@ -78,7 +80,7 @@ def predict_channel(
     over: Chain = (),
     reflections: Reflections | None = None,
     wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
-    max_bounces: int = MOST_BOUNCES,
+    max_bounces: int = USUAL_BOUNCES,
     end_slack: float = 0.0,
 ) -> tuple[PredictedPath, ...]:
     r"""Predict the paths from a user to a linear array at the origin, along +x.
@@ -105,7 +107,7 @@ def predict_channel(
         Of all walls' (angle, offset), one wall after the other; None: walls err independently,
         each as its own covariance says.
     max_bounces
-        Mirrors in a chain.
+        Most mirrors in a chain, 0 to 8.
     end_slack
         By how much a wall may reflect beyond either end, for images that tell an end only
         within a cell. [m]
@@ -117,7 +119,8 @@ def predict_channel(
     Raises
     ------
     ValueError
-        If the position's covariance is smaller than the walls of ``over`` alone make it.
+        If the position's covariance is smaller than the walls of ``over`` alone make it, or
+        ``max_bounces`` is out of range.
     """
     known = reflections or wall_reflections(len(walls))
     wavelength = speed_of_light / frequency
@@ -128,7 +131,7 @@ def predict_channel(
     inputs = input_covariance(user, covariance, walls, over, wall_covariance)
     paths = []
     doors = [_lengthened(wall, end_slack) for wall in walls]
-    for chain in possible_chains(doors, deepest=max_bounces):
+    for chain in possible_chains(doors, deepest=checked_bounces(max_bounces)):
         traced = _trace(user, doors, chain, screens)
         if traced is None:
             continue
@@ -165,7 +168,7 @@ def predict_user_channel(
     *,
     frequency: float,
     reflections: Reflections | None = None,
-    max_bounces: int = MOST_BOUNCES,
+    max_bounces: int = USUAL_BOUNCES,
 ) -> tuple[PredictedPath, ...]:
     """Predict the channel of a user that was located, from the map located with it.
 

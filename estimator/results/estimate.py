@@ -96,6 +96,7 @@ class PathReport:
     mirrors: tuple[int, ...] | None  # met on the way, from the array outward; None: not known
     used: bool  # whether the answer rests on it
     reason: str | None = None  # why not
+    elevation: float | None = None  # of a planar array: above its horizontal plane [rad]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
-from estimator.geometry.wall_3d import PlaneWall, within
+from estimator.geometry.wall_3d import PlaneWall, hidden_by, within
 from estimator.imaging.backprojection import prepare
 from estimator.imaging.focusing import focus_within
 from estimator.imaging.range_compression import range_profiles
@@ -32,6 +32,7 @@ from estimator.walls.plane_fit import (
     towards_array,
 )
 from estimator.wavefronts.curvature_search_3d import search_wavefront
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
 
 LEAST_CONFIDENCE = 1 - false_alarm.WALL
@@ -190,7 +191,7 @@ def flat_waves(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> tuple[Wa
                 path_length=start.path_length,
                 curvature=start.curvature,
             )
-        except ValueError:
+        except NoWaveError:
             continue  # no summit: not one wave
         point, deviation = 1 / wave.path_length, float(np.sqrt(wave.covariance[3, 3]))
         if wave.explained < STANDS_OUT:
@@ -306,3 +307,24 @@ def _among(
 ) -> Bool[np.ndarray, " peaks"]:
     among: np.ndarray = np.any(np.all(peaks[:, None] == members[None], axis=-1), axis=1)
     return among
+
+
+def unassigned_peaks(
+    peaks: Float[np.ndarray, "peaks 3"], planes: Sequence[FittedPlane], coarse: Resolution
+) -> Float[np.ndarray, "unassigned 3"]:
+    """Return the peaks that lie neither on a wall nor behind one.
+
+    Parameters
+    ----------
+    peaks
+        Of the survey, or of a piece beside it. [m]
+    planes
+        Walls as the survey shows them.
+    coarse
+        Its resolution.
+    """
+    free = ~_explained(peaks, planes, coarse)
+    for plane in planes:
+        free &= ~hidden_by(peaks, plane.wall)
+    unassigned: np.ndarray = peaks[free]
+    return unassigned

@@ -23,6 +23,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import UNIFORM_STEP, Uplink
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.phase_error import wavefront_error
 
@@ -66,6 +67,23 @@ class SphericalWave:
     gain: complex  # field at the array's centre, at zero path length [-]
     covariance: Float[np.ndarray, "parameters parameters"]  # of aoa, path length (, radius)
     explained: float  # its energy over the uplink's; of orthogonal waves, their shares [-]
+
+    @property
+    def bearing(self) -> Float[np.ndarray, " 1"]:
+        """What a linear array measures of the direction: the angle. [rad]."""
+        return np.array([self.aoa])
+
+    @property
+    def curvature(self) -> float:
+        """Of the wavefront at the array's centre. [1/m]."""
+        return 1 / self.radius
+
+    @property
+    def curvature_deviation(self) -> float:
+        """Its standard deviation, to first order; 0 where it was not fitted. [1/m]."""
+        if len(self.covariance) < 3:
+            return 0.0
+        return float(np.sqrt(self.covariance[2, 2]) / self.radius**2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +160,7 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
 
     Raises
     ------
-    ValueError
+    NoWaveError
         If the iteration leaves the neighbourhood of a peak, or two waves become one.
     """
     wavenumbers = 2 * np.pi * uplink.frequencies / speed_of_light
@@ -165,7 +183,7 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
         for values, origin, start in zip(parameters, first, starts, strict=True):
             far = np.abs(values[:2] - origin[:2]) > FARTHEST * lobe
             if np.any(far) or np.any(values <= 0):
-                raise ValueError(
+                raise NoWaveError(
                     f"no peak within two main lobes of {np.degrees(start.aoa):.3f}°, "
                     f"{start.path_length:.4f} m"
                 )
@@ -243,7 +261,7 @@ def _linearised(
     try:
         gains = np.linalg.solve(gram, against)
     except np.linalg.LinAlgError:
-        raise ValueError("two waves became one") from None
+        raise NoWaveError("two waves became one") from None
     fields = tuple(gain * unit for gain, unit in zip(gains, units, strict=True))
     residual = uplink.samples - sum(fields)
     slopes = tuple(_slopes(uplink, values) for values in parameters)
@@ -317,7 +335,7 @@ def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) 
     scale = 1 / np.sqrt(np.diag(normal))
     scaled = normal * np.outer(scale, scale)
     if len(starts) > 1 and np.linalg.cond(scaled) > MOST_CONDITION:
-        raise ValueError("two waves became one")
+        raise NoWaveError("two waves became one")
     inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
     return inverse
 

@@ -23,6 +23,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, Uplink
+from estimator.wavefronts.no_wave import NoWaveError
 
 ITERATIONS = 15
 """Most Gauss-Newton steps. [-]"""
@@ -53,6 +54,16 @@ class Wavefront:
     covariance: Float[np.ndarray, "parameters parameters"]  # of cosines, length (, curvature)
     explained: float  # share of the samples' energy [-]
     passes: int
+
+    @property
+    def bearing(self) -> Float[np.ndarray, " 2"]:
+        """What a planar array measures of the direction: its cosines. [-]."""
+        return np.array(self.cosines)
+
+    @property
+    def curvature_deviation(self) -> float:
+        """Standard deviation of the curvature; 0 where it was not fitted. [1/m]."""
+        return float(np.sqrt(self.covariance[3, 3])) if len(self.covariance) > 3 else 0.0
 
     @property
     def direction(self) -> Float[np.ndarray, " 3"]:
@@ -100,7 +111,7 @@ def fit_wavefront(
 
     Raises
     ------
-    ValueError
+    NoWaveError
         If the iteration leaves the neighbourhood of the start.
     """
     passes = 2 if isinstance(measured, Echo) else 1
@@ -127,9 +138,9 @@ def fit_wavefront(
         parameters = parameters + step
         gone = np.abs(parameters[:3] - start[:3]) > FARTHEST * lobe[:3]
         if np.any(gone) or parameters[0] ** 2 + parameters[1] ** 2 >= 1 or parameters[2] <= 0:
-            raise ValueError(f"no summit within two main lobes of {start[:3]}")
+            raise NoWaveError(f"no summit within two main lobes of {start[:3]}")
         if free and not CURVATURES[0] / half < parameters[3] < CURVATURES[1] / half:
-            raise ValueError(f"the curvature runs off to {parameters[3]:.3g}/m")
+            raise NoWaveError(f"the curvature runs off to {parameters[3]:.3g}/m")
         deviation = np.sqrt(np.diag(np.linalg.inv(normal))[2:])
         noise = np.sqrt(energy * max(1 - explained, 1e-12) / measured.samples.size)
         if np.all(np.abs(step) < CONVERGED * deviation * noise + 1e-14):

@@ -59,7 +59,7 @@ PLANTED = (
     ),
     PlantedError(
         name="image plane 1 mm off in the estimator",
-        file="estimator/geometry/path_tracing_2d.py",
+        file="estimator/geometry/wall_2d.py",
         right="((points - start) @ normal)[..., None] * normal",
         # Directions are mirrored about the origin: they are left alone.
         wrong="((points - start) @ normal + 1e-3 * bool(np.any(start)))[..., None] * normal",

@@ -7,7 +7,6 @@ from estimator.channel.angle_range_map_2d import (
     angle_range_map,
     default_angles,
     default_path_lengths,
-    direction_range_map,
     polar_points,
 )
 from estimator.measurement.model import MeasurementError, Uplink
@@ -55,29 +54,6 @@ def test_an_array_along_another_axis_measures_from_that_axis() -> None:
         boresight=np.array([-1.0, 5.0, 0.0]),
     )
     assert abs(chart.values[0, 0] - 1) < 1e-3
-
-
-def test_a_planar_array_sees_azimuth_and_elevation() -> None:
-    x, z = np.meshgrid(np.arange(20), np.arange(20))
-    positions = np.stack([x.ravel() * 1e-3, np.zeros(400), z.ravel() * 1e-3], axis=1)
-    centre = positions.mean(axis=0)
-    azimuth, elevation = np.radians([60.0, 20.0])
-    source = centre + 0.4 * np.array(
-        [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-        ]
-    )
-    chart = direction_range_map(
-        uplink_from(source, positions),
-        azimuth=azimuth + np.linspace(-0.1, 0.1, 11),
-        elevation=elevation + np.linspace(-0.1, 0.1, 11),
-        path_length=np.array([0.39, 0.4, 0.41]),
-    )
-    peak = np.unravel_index(np.abs(chart.values).argmax(), chart.values.shape)
-    assert peak == (5, 5, 1)
-    assert abs(chart.values[peak] - 1) < 1e-3
 
 
 def test_polar_points_lie_at_their_distance_and_angle() -> None:

@@ -14,7 +14,8 @@ from estimator.channel.angle_range_map_2d import (
     default_angles,
     default_path_lengths,
 )
-from estimator.channel.path_extraction_2d import LEAST_SHARE, Path, find_paths
+from estimator.channel.path import LEAST_SHARE, Path
+from estimator.channel.path_extraction_2d import find_paths
 from estimator.measurement.model import Uplink
 from estimator.wavefronts.curvature_search_2d import search_curvature
 from estimator.wavefronts.noise_variance import noise_variance
@@ -50,7 +51,7 @@ def test_a_user_in_sight_is_one_specular_wave_with_all_the_energy(world: Any) ->
     assert path.specular
     assert path.share == pytest.approx(1.0, abs=0.02)
     deviation = np.sqrt(np.diag(path.wave.covariance))
-    assert abs(path.wave.aoa - np.radians(63.0)) <= 5 * deviation[0]
+    assert abs(path.wave.bearing[0] - np.radians(63.0)) <= 5 * deviation[0]
     assert abs(path.wave.path_length - 0.4) <= 5 * deviation[1]
     assert path.unambiguous == pytest.approx(UNAMBIGUOUS)
 
@@ -63,7 +64,7 @@ def test_two_paths_are_told_apart_with_their_shares(world: Any) -> None:
     assert first.specular
     assert second.specular
     np.testing.assert_allclose(
-        np.degrees([first.wave.aoa, second.wave.aoa]), [70.0, 100.0], atol=0.02
+        np.degrees([first.wave.bearing[0], second.wave.aoa]), [70.0, 100.0], atol=0.02
     )
     np.testing.assert_allclose(
         [first.wave.path_length, second.wave.path_length], [0.3, 0.42], atol=1e-4
@@ -108,7 +109,7 @@ def test_a_wave_far_below_the_noise_of_a_sample_is_found_by_the_whole_array(worl
     samples = world.noisy(pilot(world, source(80.0, 0.35)), -10.0, np.random.default_rng(6))
     (path,) = waves(world, samples)
     # Cramér-Rao at 29 dB: about 0.05° and 0.05 mm.
-    assert np.degrees(path.wave.aoa) == pytest.approx(80.0, abs=0.3)
+    assert np.degrees(path.wave.bearing[0]) == pytest.approx(80.0, abs=0.3)
     assert path.wave.path_length == pytest.approx(0.35, abs=1e-3)
     assert path.specular
 

@@ -6,7 +6,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from jaxtyping import Float
 
-from estimator.geometry.path_tracing_2d import MOST_BOUNCES, Projection, project
+from estimator.geometry.bearing_2d import LINEAR
+from estimator.geometry.path_tracing import Projection, project
+from estimator.geometry.specular_chains import LONGEST_CHAIN
 from estimator.geometry.wall_2d import Wall, crossing, mirrored
 
 NOTHING = np.zeros((2, 2))
@@ -22,7 +24,7 @@ def wall(
 
 
 def launched(aoa_deg: float, length: float, walls: list[Wall]) -> Projection:
-    return project(np.radians(aoa_deg), length, walls, covariance=NOTHING)
+    return project(LINEAR, np.radians([aoa_deg]), length, walls, covariance=NOTHING)
 
 
 SLANTED = wall((-0.2, 0.6), (0.2, 1.0))  # through (0, 0.8) at 45°, as in the thesis
@@ -141,7 +143,7 @@ def test_over_two_walls_the_path_is_that_of_the_image_of_the_image(
     image = mirrored(user, walls[0].start, walls[0].end)
     image = mirrored(image, walls[1].start, walls[1].end)
     length = float(np.linalg.norm(image))
-    found = project(float(np.arctan2(image[1], image[0])), length, walls, covariance=NOTHING)
+    found = project(LINEAR, LINEAR.of(image), length, walls, covariance=NOTHING)
     assume(found.walls == (1, 0))  # the legs hit both walls within their extent
     np.testing.assert_allclose(found.position, user, atol=1e-9)
     # The path's pieces add up to its length, and each bounce lies on its wall.
@@ -165,7 +167,7 @@ def test_between_facing_mirrors_a_ray_bounces_no_more_than_the_limit() -> None:
     # Two plates above and below the array's line of sight: the ray zigzags.
     walls = [wall((-5.0, 0.1), (5.0, 0.1)), wall((-5.0, -0.1), (5.0, -0.1))]
     found = launched(60.0, 4.0, walls)
-    assert len(found.walls) == MOST_BOUNCES
+    assert len(found.walls) == LONGEST_CHAIN
     assert set(found.walls) == {0, 1}
     assert np.linalg.norm(np.diff(found.path, axis=0), axis=-1).sum() == pytest.approx(4.0)
 
@@ -206,7 +208,9 @@ def test_the_covariance_of_the_position_is_that_of_monte_carlo(
     of_path = np.array([[4e-8, 1e-9], [1e-9, 1e-8]])  # 0.2 mrad, 0.1 mm
     of_wall = np.array([[9e-8, -1e-9], [-1e-9, 4e-9]])  # 0.3 mrad, 0.06 mm
     uncertain = [replace(one, covariance=of_wall) for one in walls]
-    predicted = project(np.radians(aoa_deg), length, uncertain, covariance=of_path).covariance
+    predicted = project(
+        LINEAR, np.radians([aoa_deg]), length, uncertain, covariance=of_path
+    ).covariance
     trials = 4000
     scatter = sampled_covariance(np.radians(aoa_deg), length, uncertain, of_path, trials)
     white = np.linalg.inv(np.linalg.cholesky(predicted[:2, :2]))
@@ -219,14 +223,14 @@ def test_the_covariance_of_the_position_is_that_of_monte_carlo(
 
 def test_a_mirrors_tilt_turns_the_reflected_ray_twice_as_far() -> None:
     tilt = 1e-3
-    over = launched(90.0, 1.8, [SLANTED.moved(tilt=tilt, offset=0.0)])
+    over = launched(90.0, 1.8, [SLANTED.moved(np.array([tilt, 0.0]))])
     # From the hit, 1 m on: 2 mm sideways, to the left as the turn is counter-clockwise.
     np.testing.assert_allclose(over.position, [1.0, 0.8 + 2 * tilt, 0], atol=5 * tilt**2)
 
 
 def test_moving_a_mirror_along_its_normal_moves_the_user_twice_as_far() -> None:
     offset = 1e-3
-    over = launched(90.0, 1.8, [SLANTED.moved(tilt=0.0, offset=offset)])
+    over = launched(90.0, 1.8, [SLANTED.moved(np.array([0.0, offset]))])
     # The normal of a wall is its way turned by -90°: (1, -1)/√2.
     expected = np.array([1.0, 0.8, 0]) + 2 * offset * np.array([1, -1, 0]) / np.sqrt(2)
     np.testing.assert_allclose(over.position, expected, atol=1e-12)

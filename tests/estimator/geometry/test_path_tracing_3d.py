@@ -2,7 +2,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.geometry.path_tracing_3d import project_in_space
+from estimator.geometry.bearing_3d import PLANAR
+from estimator.geometry.path_tracing import project
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about, within
 from estimator.walls.plane_fit import plane_axes
 
@@ -24,9 +25,9 @@ def wall(
     )
 
 
-def seen_at(place: np.ndarray) -> tuple[tuple[float, float], float]:
+def seen_at(place: np.ndarray) -> tuple[np.ndarray, float]:
     length = float(np.linalg.norm(place))
-    return (float(place[0]) / length, float(place[2]) / length), length
+    return PLANAR.of(place), length
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
@@ -48,13 +49,13 @@ def test_a_path_over_one_and_two_walls_ends_at_the_user() -> None:
     user = np.array([0.5, 0.9, 0.05])
     image = mirrored_about(user, first)
     cosines, length = seen_at(image)
-    found = project_in_space(cosines, length, [first], covariance=np.zeros((3, 3)))
+    found = project(PLANAR, cosines, length, [first], covariance=np.zeros((3, 3)))
     assert found.walls == (0,)
     np.testing.assert_allclose(found.position, user, atol=1e-12)
     # Over two walls: the user's image in the second, then in the first.
     user = np.array([0.45, 0.6, 0.05])
     cosines, length = seen_at(mirrored_about(mirrored_about(user, second), first))
-    found = project_in_space(cosines, length, [first, second], covariance=np.zeros((3, 3)))
+    found = project(PLANAR, cosines, length, [first, second], covariance=np.zeros((3, 3)))
     assert found.walls == (0, 1)
     np.testing.assert_allclose(found.position, user, atol=1e-12)
     legs = np.linalg.norm(np.diff(found.path, axis=0), axis=1)
@@ -67,15 +68,13 @@ def test_the_first_order_covariance_is_that_of_drawn_walls_and_paths() -> None:
     mirror = wall((0.0, 1.5, 0.0), (0.6, -1.0, 0.1), covariance=spread)
     noise = np.diag([5e-4, 1e-3, 2e-3]) ** 2
     cosines, length = seen_at(mirrored_about(np.array([0.5, 0.9, 0.05]), mirror))
-    claimed = project_in_space(cosines, length, [mirror], covariance=noise).covariance
+    claimed = project(PLANAR, cosines, length, [mirror], covariance=noise).covariance
     ends = []
     for _ in range(500):
         moved = mirror.moved(rng.multivariate_normal(np.zeros(3), spread))
         drawn = rng.multivariate_normal([*cosines, length], noise)
         ends.append(
-            project_in_space(
-                (drawn[0], drawn[1]), drawn[2], [moved], covariance=np.zeros((3, 3))
-            ).position
+            project(PLANAR, drawn[:2], drawn[2], [moved], covariance=np.zeros((3, 3))).position
         )
     # A covariance over n draws scatters by √(2/n) of itself: 6.3 %; four deviations.
     drawn_covariance = np.cov(np.array(ends).T)

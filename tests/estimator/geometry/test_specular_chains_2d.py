@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.geometry.path_tracing_2d import project
-from estimator.geometry.specular_chains_2d import image_over, possible_chains, seen_over, unfolded
+from estimator.geometry.bearing_2d import LINEAR
+from estimator.geometry.path_tracing import project
+from estimator.geometry.specular_chains import image_over, seen_over, unfolded
+from estimator.geometry.specular_chains_2d import possible_chains
 from estimator.geometry.wall_2d import Wall, mirrored
 
 ROUNDING = 1e-12
@@ -58,12 +60,11 @@ def test_the_image_of_the_true_place_is_where_it_was_seen(angle: float, reach: f
     chain = tuple(int(i) for i in chains[0] if i >= 0)
     np.testing.assert_allclose(image_over(places, ROOM, chain), seen, atol=1e-9)
     # A second implementation: the projection of a user's path of that angle and length.
-    path = project(angle, reach, ROOM, covariance=np.eye(2))
-    if len(chain) < 4:
-        assert path.walls == chain
-        np.testing.assert_allclose(path.position, places[0], atol=1e-9)
-        assert seen_over(seen, ROOM, chain)[0]
-        assert chain in set(possible_chains(ROOM))
+    path = project(LINEAR, np.array([angle]), reach, ROOM, covariance=np.eye(2))
+    assert path.walls == chain
+    np.testing.assert_allclose(path.position, places[0], atol=1e-9)
+    assert seen_over(seen, ROOM, chain)[0]
+    assert chain in set(possible_chains(ROOM))
 
 
 def test_one_wall_makes_one_chain_and_a_wall_behind_it_none_over_it() -> None:

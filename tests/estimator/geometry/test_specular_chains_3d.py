@@ -7,15 +7,19 @@ import pytest
 from jaxtyping import Float
 
 from estimator.array.resolution_cell import Resolution
-from estimator.geometry.path_tracing_3d import folded_over, project_in_space
-from estimator.geometry.specular_chains_3d import (
-    chains_in_space,
-    image_in_space,
-    seen_over_in_space,
-    unfolded_in_space,
+from estimator.geometry.bearing_3d import PLANAR
+from estimator.geometry.path_tracing import project
+from estimator.geometry.specular_chains import (
+    Chain,
+    image_over,
+    seen_over,
+    unfolded,
+    unfolded_over,
 )
+from estimator.geometry.specular_chains_3d import possible_chains
 from estimator.geometry.wall_3d import PlaneWall, mirrored_about
-from estimator.mapping.map_3d import corrected_values, fold_planes
+from estimator.mapping.ghost_correction import corrected_image
+from estimator.mapping.map_3d import fold_planes
 from estimator.walls.plane_fit import FittedPlane, plane_axes
 
 
@@ -46,21 +50,20 @@ def test_lines_are_folded_as_rays_that_are_followed_one_by_one(seed: int) -> Non
     rng = np.random.default_rng(seed)
     walls = random_walls(rng)
     points = rng.uniform([-2.0, 0.3, -1.0], [2.0, 6.0, 1.0], (300, 3))
-    places, chains = unfolded_in_space(points, walls, deepest=8)
+    places, chains = unfolded(points, walls, deepest=8)
     lengths = []
     for point, place, chain in zip(points, places, chains, strict=True):
         far = float(np.linalg.norm(point))
-        cosines = float(point[0] / far), float(point[2] / far)
-        ray = project_in_space(cosines, far, walls, covariance=np.zeros((3, 3)))
+        ray = project(PLANAR, PLANAR.of(point), far, walls, covariance=np.zeros((3, 3)))
         assert tuple(chain[chain >= 0]) == ray.walls
         np.testing.assert_allclose(place, ray.position, atol=1e-9)
-        np.testing.assert_allclose(folded_over(point, walls, ray.walls), ray.position, atol=1e-9)
+        np.testing.assert_allclose(unfolded_over(point, walls, ray.walls), ray.position, atol=1e-9)
         lengths.append(len(ray.walls))
     assert max(lengths) >= 2  # else this shows nothing
 
 
 def test_without_walls_everything_is_where_it_shows() -> None:
-    places, chains = unfolded_in_space(THING[None], [], deepest=2)
+    places, chains = unfolded(THING[None], [], deepest=2)
     np.testing.assert_allclose(places[0], THING)
     np.testing.assert_array_equal(chains, [[-1, -1]])
 
@@ -68,21 +71,48 @@ def test_without_walls_everything_is_where_it_shows() -> None:
 def test_an_image_is_seen_over_the_chain_whose_walls_its_line_meets() -> None:
     # The walls stand at right angles, so that both orders have one image: its line meets the
     # first wall first. Over each wall alone the thing is seen from the side.
-    seen_over = {(0,), (1,), (0, 1)}
-    for chain in chains_in_space(2, deepest=3):
-        image = image_in_space(THING, WALLS, chain)
-        np.testing.assert_allclose(folded_over(image, WALLS, chain), THING, atol=1e-12)
-        seen = seen_over_in_space(image[None], WALLS, chain, skin=0.02)[0]
-        assert seen == (chain in seen_over)
-    assert len(list(chains_in_space(3, deepest=2))) == 3 + 6
+    over = {(0,), (1,), (0, 1)}
+    for chain in [(0,), (1,), (0, 1), (1, 0), (0, 1, 0), (1, 0, 1)]:
+        image = image_over(THING, WALLS, chain)
+        np.testing.assert_allclose(unfolded_over(image, WALLS, chain), THING, atol=1e-12)
+        assert seen_over(image[None], WALLS, chain, skin=0.02)[0] == (chain in over)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_chain_that_a_ray_follows_is_among_the_possible_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    walls = random_walls(rng)
+    points = rng.uniform([-2.0, 0.3, -1.0], [2.0, 6.0, 1.0], (3000, 3))
+    met = {tuple(int(i) for i in row if i >= 0) for row in unfolded(points, walls)[1]}
+    possible = set(possible_chains(walls))
+    assert met <= possible
+    assert max(len(chain) for chain in met) >= 2  # else this shows nothing
+    # Of all chains that repeat no wall at once, 4 · 3⁷ of eight alone, few are left.
+    assert len(possible) < 200
+
+
+@pytest.mark.parametrize("deepest", [0, 1, 2, 3, 8])
+def test_between_two_parallel_walls_there_are_chains_of_every_length_asked_for(
+    deepest: int,
+) -> None:
+    # The array stands between them and looks along both: to and fro, as often as one likes.
+    walls = [square([-0.5, 4.0, 0.0], [1.0, 0.0, 0.0], 6.0),
+             square([0.5, 4.0, 0.0], [-1.0, 0.0, 0.0], 6.0)]  # fmt: skip
+    lengths = [len(chain) for chain in possible_chains(walls, deepest=deepest)]
+    # From either wall first: one chain of each length and side.
+    assert sorted(lengths) == [0] + [n for n in range(1, deepest + 1) for _ in range(2)]
+    # The n-th image of the last wall stands n - 1/2 metres aside.
+    near = [len(chain) for chain in possible_chains(walls, deepest=deepest, reach=2.6)]
+    assert max(near) == min(deepest, 3)
 
 
 def test_a_ghost_over_two_walls_comes_back_to_its_place_in_the_corrected_image(world: Any) -> None:
-    image = image_in_space(THING, WALLS, (0, 1))
+    image = image_over(THING, WALLS, (0, 1))
     survey = world.volume(image, 0.08, np.linspace(0.3, 5.0, 236))
     halfway = mirrored_about(image, FIRST)  # where folding once would leave it
     places = np.stack([THING, image, halfway])
-    folded = np.abs(corrected_values(survey, places, WALLS, skin=0.02))
+    chains = possible_chains(WALLS)
+    folded = np.abs(corrected_image(survey.at, places, WALLS, chains, skin=0.02).values)
     assert folded[0] == pytest.approx(abs(survey.at(image[None])[0]), rel=1e-9)
     assert folded[0] > 0.8
     assert folded[1:].max() == 0.0
@@ -92,9 +122,9 @@ def test_a_wall_that_is_seen_over_two_others_is_folded_over_both() -> None:
     # A third wall closes the way that the second sends the view: the array sees it over both.
     third = square([1.5, 0.2, 0.0], [0.3, 1.0, 0.0], half=0.3)
 
-    def shown(wall: PlaneWall, chain: tuple[int, ...]) -> FittedPlane:
-        corners = image_in_space(wall.corners, WALLS, chain)
-        centre = image_in_space(wall.centre, WALLS, chain)
+    def shown(wall: PlaneWall, chain: Chain) -> FittedPlane:
+        corners = image_over(wall.corners, WALLS, chain)
+        centre = image_over(wall.centre, WALLS, chain)
         normal: Float[np.ndarray, " 3"] = np.cross(corners[1] - corners[0], corners[2] - corners[1])
         return FittedPlane(
             wall=PlaneWall(

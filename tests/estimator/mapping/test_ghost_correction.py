@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
+from estimator.geometry.specular_chains_2d import possible_chains
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.imaging.backprojection import focus, prepare
 from estimator.imaging.range_compression import range_profiles
@@ -41,7 +42,7 @@ def test_a_ghost_maps_back_onto_its_target() -> None:
     target = np.array([0.2, 0.32, 0.0])
     ghost = mirrored(target, SLANTED.start, SLANTED.end)
     at_both = np.stack([target, ghost])
-    folded = corrected_image(spot(ghost), at_both, [SLANTED])
+    folded = corrected_image(spot(ghost), at_both, [SLANTED], possible_chains([SLANTED]))
     image = folded.values
     assert abs(image[0]) == pytest.approx(1.0, abs=1e-12)
     assert image[1] == 0  # and nothing is left where it seemed to be
@@ -70,7 +71,7 @@ def test_nothing_behind_a_wall_remains_and_what_is_seen_directly_is_untouched(
     assume(abs(far - 1) > 1e-6)
     assume(abs(abs(far * image[0]) - 0.1) > 1e-6)
     through = 0 < far < 1 and abs(far * image[0]) < 0.1
-    folded = corrected_image(one, point, [SLANTED])
+    folded = corrected_image(one, point, [SLANTED], possible_chains([SLANTED]))
     assert folded.values[0] == int(not hidden or through)
     assert (folded.chain[0] >= 0) == (not hidden or through)
 
@@ -78,7 +79,7 @@ def test_nothing_behind_a_wall_remains_and_what_is_seen_directly_is_untouched(
 def test_without_walls_the_image_stays_as_it_is() -> None:
     points = np.random.default_rng(1).uniform([-0.3, 0.1, 0], [0.3, 0.5, 0], (4, 5, 3))
     focuser = spot(np.array([0.0, 0.3, 0.0]), width=0.2)
-    folded = corrected_image(focuser, points, [])
+    folded = corrected_image(focuser, points, [], possible_chains([]))
     np.testing.assert_array_equal(folded.values, focuser(points))
     assert folded.chains == ((),)
     assert not folded.chain.any()
@@ -93,7 +94,7 @@ def test_of_two_views_of_a_thing_the_brighter_is_kept() -> None:
     def focuser(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
         return np.asarray(sum(spot(ghost)(points) * (i + 1) for i, ghost in enumerate(ghosts)))
 
-    folded = corrected_image(focuser, target[None], both)
+    folded = corrected_image(focuser, target[None], both, possible_chains(both))
     # The brighter one, as the raw image has it; the other is centimetres off: exp(-(40/5)²).
     assert folded.values[0] == pytest.approx(2 * np.exp(1j * ghosts[1][0]), abs=1e-12)
     assert folded.chains[folded.chain[0]] == (1,)
@@ -107,7 +108,7 @@ def test_the_focuser_is_asked_only_for_what_is_seen() -> None:
         return one(points)
 
     behind = np.array([[-0.05, 0.5, 0.0]])
-    assert corrected_image(focuser, behind, [SLANTED]).values[0] == 0
+    assert corrected_image(focuser, behind, [SLANTED], possible_chains([SLANTED])).values[0] == 0
     assert sum(points.size for points in asked) == 0
 
 
@@ -123,7 +124,9 @@ def test_the_echo_over_a_mirror_focuses_on_the_target_itself(world: Any) -> None
     x, y = [-0.02, -4e-3, 0.0, 4e-3, 0.02], [-0.01, -2e-3, 0.0, 2e-3, 0.01]
     offsets = np.stack(np.meshgrid(x, y, [0.0], indexing="ij"), axis=-1)
     around = target + offsets[:, :, 0]
-    folded = corrected_image(lambda points: focus(ready, points), around, [SLANTED])
+    folded = corrected_image(
+        lambda points: focus(ready, points), around, [SLANTED], possible_chains([SLANTED])
+    )
     image = np.abs(folded.values)
     assert int(np.argmax(image)) == 12  # the one in the middle
     assert image[2, 2] == pytest.approx(1.0, abs=1e-3)  # what back-projection promises

@@ -5,9 +5,11 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution_cell import Resolution
+from estimator.geometry.specular_chains_3d import possible_chains
 from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.imaging.range_gating import gated
-from estimator.mapping.map_3d import corrected_values, mirrored_wall
+from estimator.mapping.ghost_correction import corrected_image
+from estimator.mapping.map_3d import mirrored_wall
 from estimator.measurement.model import Echo, Uplink
 from estimator.walls.plane_detection import find_planes
 from estimator.walls.plane_fit import plane_axes
@@ -102,7 +104,8 @@ def test_a_ghost_behind_a_wall_moves_in_front_and_the_wall_stays(world: Any) -> 
     raw = np.abs(survey.at(places))
     assert raw[0] > 0.9  # interpolated linearly over half its width
     assert raw[1] < 1e-3
-    folded = np.abs(corrected_values(survey, places, [mirror], skin=0.02))
+    chains = possible_chains([mirror])
+    folded = np.abs(corrected_image(survey.at, places, [mirror], chains, skin=0.02).values)
     assert folded[0] == 0.0
     assert folded[1] == pytest.approx(raw[0], rel=1e-9)
 

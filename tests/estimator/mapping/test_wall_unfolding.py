@@ -7,9 +7,10 @@ import pytest
 from jaxtyping import Float
 
 from estimator.array.resolution_cell import Resolution
-from estimator.geometry.specular_chains_2d import image_over
+from estimator.geometry.specular_chains import image_over
 from estimator.geometry.wall_2d import Wall, mirrored
-from estimator.mapping.wall_unfolding import fold_lines, fold_seen_lines, place_covariance
+from estimator.geometry.wall_covariance import place_covariance
+from estimator.mapping.wall_unfolding import fold_lines, fold_seen_lines
 from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
@@ -115,7 +116,7 @@ def test_a_folded_wall_errs_with_its_mirrors() -> None:
         for fitted in LINES:
             tilt, offset = DEVIATIONS * rng.standard_normal(2)
             seen = Wall(start=fitted.start, end=fitted.end, covariance=fitted.covariance)
-            moved = seen.moved(tilt=float(tilt), offset=float(offset))
+            moved = seen.moved(np.array([tilt, offset]))
             shaken.append(line(np.stack([moved.start, moved.end])))
         row = []
         for new, old in zip(fold_lines(shaken, RESOLUTION).walls, folded.walls, strict=True):
@@ -138,7 +139,7 @@ def test_a_folded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
     target = np.array([0.5, 0.8, 0.0])
     ghost = mirrored(target, FIRST[0], FIRST[1])
     own = np.diag([1e-8, 4e-8, 0.0])
-    found = place_covariance(ghost, own, folded, (0,))
+    found = place_covariance(ghost, own, folded.walls, folded.covariance, (0,))
     # 45°: what was across is along. The place is 0.5 m off the wall's midpoint, at 45° to it:
     # turned twice by the angle's error, moved twice by the offset's along the normal.
     normal, along = np.array([1.0, -1.0]) / np.sqrt(2), np.array([1.0, 1.0]) / np.sqrt(2)
@@ -149,4 +150,6 @@ def test_a_folded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
     np.testing.assert_allclose(
         found[:2, :2], np.diag([4e-8, 1e-8]) + shift + turn, rtol=1e-5, atol=1e-14
     )
-    np.testing.assert_array_equal(place_covariance(ghost, own, folded, ()), own)
+    np.testing.assert_array_equal(
+        place_covariance(ghost, own, folded.walls, folded.covariance, ()), own
+    )

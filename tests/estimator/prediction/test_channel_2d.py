@@ -8,7 +8,8 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.array_frame import array_frame
-from estimator.geometry.path_tracing_2d import project
+from estimator.geometry.bearing_2d import LINEAR
+from estimator.geometry.path_tracing import project
 from estimator.geometry.wall_2d import Wall
 from estimator.prediction.channel_2d import PredictedPath, predict_channel, predict_user_channel
 from estimator.prediction.wall_reflection import (
@@ -179,7 +180,7 @@ def test_the_path_that_gave_the_position_is_as_certain_as_it_was_measured() -> N
     walls = [wall(0.0, 0.8, 45.0, 0.6, tilt=5e-4, offset=2e-4), wall(0.9, 0.8, -45.0, 0.6)]
     walls[1] = Wall(start=walls[1].start, end=walls[1].end, covariance=np.diag([1e-6, 1e-7]))
     measured = np.array([[1e-10, 2e-10], [2e-10, 1e-9]])
-    found = project(np.radians(89.0), 2.5, walls, covariance=measured)
+    found = project(LINEAR, np.radians([89.0]), 2.5, walls, covariance=measured)
     assert found.walls == (0, 1)
     paths = predict_channel(
         found.position, found.covariance, walls, frequency=FREQUENCY, over=(0, 1)
@@ -216,7 +217,7 @@ def test_the_covariance_is_that_of_drawn_positions_and_walls(rests: bool) -> Non
         return np.asarray(feet[index] + turned)
 
     measured = np.diag([1e-4, 3e-4]) ** 2
-    found = project(np.radians(100.0), 1.73, walls[:1], covariance=measured)
+    found = project(LINEAR, np.radians([100.0]), 1.73, walls[:1], covariance=measured)
     if rests:
         seen = rng.multivariate_normal([np.radians(100.0), 1.73], measured, size=trials)
         users = reflected(seen[:, 1] * np.exp(1j * seen[:, 0]), 0)
@@ -381,7 +382,7 @@ def test_a_gain_over_a_wall_that_there_is_not_is_refused() -> None:
 def test_a_located_user_has_its_channel_in_any_frame() -> None:
     uncertain = wall(0.0, 0.8, 45.0, 0.4, tilt=3e-4, offset=1e-4)
     measured = np.diag([1e-5, 2e-5]) ** 2
-    found = project(np.radians(90.0), 1.8, [uncertain], covariance=measured)
+    found = project(LINEAR, np.radians([90.0]), 1.8, [uncertain], covariance=measured)
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     positions = np.zeros((5, 3))
     positions[:, 0] = np.linspace(-0.06, 0.06, 5)

@@ -9,6 +9,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Uplink
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.wave_fit_2d import SphericalWave, fit_spherical_wave, wave_field
 
 BAND = np.linspace(220e9, 295e9, 41)
@@ -231,7 +232,7 @@ def test_a_start_far_from_any_peak_is_refused_or_explains_next_to_nothing() -> N
                 wave = fit_spherical_wave(
                     clean, aoa=1.3 + beams * BEAM, path_length=0.6 + cells * CELL
                 )
-            except ValueError as error:
+            except NoWaveError as error:
                 refused += 1
                 assert "no peak within two main lobes of" in str(error)  # noqa: PT017
                 continue
@@ -244,7 +245,7 @@ def test_noise_alone_has_no_peak_that_explains_it() -> None:
     noise = rng.standard_normal((40, 41)) + 1j * rng.standard_normal((40, 41))
     try:
         wave = fit_spherical_wave(pilot(noise), aoa=1.3, path_length=0.6)
-    except ValueError:
+    except NoWaveError:
         return
     # The maximum of n exponentials over n is ln(n)/n: 0.5 % of 1640 samples.
     assert wave.explained < 0.02

@@ -4,6 +4,7 @@ from jaxtyping import Float
 
 from estimator.measurement.model import Echo, Uplink
 from estimator.wavefronts.curvature_search_3d import search_wavefront
+from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront, towards, wavefront_field
 from validation.analytic.point_scatterer import complex_noise, point_echo, point_uplink
 
@@ -96,7 +97,7 @@ def test_in_white_noise_the_errors_have_the_covariance_that_is_claimed() -> None
 def test_a_curvature_inside_of_the_aperture_is_refused() -> None:
     source = np.array([[0.3, 1.0, 0.0]])
     uplink = point_uplink(source, positions=planar_array(), frequencies=BAND)
-    with pytest.raises(ValueError, match="runs off"):
+    with pytest.raises(NoWaveError, match="runs off"):
         fit_wavefront(uplink, cosines=(0.29, 0.0), path_length=1.04, curvature=30.0)
 
 

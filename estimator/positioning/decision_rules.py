@@ -13,48 +13,35 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
-from estimator.array.resolution_cell import Resolution
-from estimator.channel.path_extraction_2d import Path, PathSet
-from estimator.geometry.path_tracing_2d import project
-from estimator.geometry.wall_2d import Wall, mirrored
+from estimator import false_alarm
+from estimator.channel.path import Path, PathSet
+from estimator.geometry.bearing import Bearing
+from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.path_tracing import trace
+from estimator.geometry.specular_chains import Chain
 from estimator.positioning.los_check import doubt_straight_way
-from estimator.positioning.map_context import Surroundings
-from estimator.positioning.weighted_least_squares import (
-    Consensus,
-    Sighting,
-    block_covariance,
-    solve_position,
-)
+from estimator.positioning.map_context import MapContext
+from estimator.positioning.weighted_least_squares import Consensus, Sighting, solve_position
 from estimator.results.estimate import PathReport, UserEstimate
 
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
 END_DEVIATIONS = 3.0
 """Deviations of the angle, beside the image's cell, by which a ray may meet another wall. [-]."""
-SAME = float(chi2.ppf(0.999, df=2))
-"""Squared distance, over its covariance, within which two positions are the same. [-]."""
+SAME = 1 - false_alarm.DISAGREEMENT
+"""Probability with which two estimates of one position pass for the same. [-]"""
 SHARP = 10.0
 """A position known this many times better than the distance of its alternative cannot have
 been hit by chance: two paths agree there. [-]."""
 
 
 def decide(
-    name: str,
-    found: PathSet,
-    walls: Sequence[Wall],
-    *,
-    resolution: Resolution,
-    imaged: bool,
-    unassigned_peaks: Float[np.ndarray, "peaks 3"],
-    wall_covariance: Float[np.ndarray, "parameters parameters"] | None = None,
-    clock_known: bool = True,
-    reach: float = np.inf,
-    widest: float = 1.0,
-    contrast: float = np.inf,
+    name: str, found: PathSet, room: MapContext, *, clock_known: bool = True
 ) -> UserEstimate:
-    """Locate a user in the array's frame.
+    """Locate a user in the array's frame, in the plane or in space.
 
     Parameters
     ----------
@@ -62,24 +49,10 @@ def decide(
         The user's.
     found
         Its paths.
-    walls
-        Mirrors at their true place.
-    resolution
-        Of the image: how well it tells where a wall ends.
-    imaged
-        Whether there was an echo at all: without, nothing is known of mirrors.
-    loose
-        Peaks of the image that lie on no wall, strongest first. [m]
-    wall_covariance
-        Of (angle, offset) of all walls, one after the other; ``None``: that of each alone.
+    room
+        What the echo told of the room.
     clock_known
         Whether delays are lengths; if not, the offset is found from two or more paths.
-    reach
-        How far the image shows what there is. [m]
-    widest
-        Sine of the angle from boresight to which it does. [-]
-    contrast
-        Intensity of the brightest in the image over its background. [-]
 
     Returns
     -------
@@ -91,24 +64,14 @@ def decide(
     """
     if not found.paths:
         return UserEstimate(name=name, status="not_found", reason="no wave stands out of the pilot")
-    room = Surroundings(
-        walls=tuple(walls),
-        wall_covariance=block_covariance(walls) if wall_covariance is None else wall_covariance,
-        resolution=resolution,
-        imaged=imaged,
-        unassigned_peaks=unassigned_peaks,
-        reach=reach,
-        widest=widest,
-        contrast=contrast,
-    )
     answer = (_on_our_clock if clock_known else _on_any_clock)(name, found, room)
-    if answer.status == "found" and not imaged:
+    if answer.status == "found" and not room.imaged:
         reason = "no echo was measured, so mirrors are unknown; this is the place without any"
         answer = replace(answer, status="ambiguous", reason=reason, line_of_sight=None)
     return answer
 
 
-def _on_our_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate:
+def _on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     specular = [index for index, path in enumerate(found.paths) if path.specular]
     scattered = [path for path in found.paths if not path.specular]
     energy = sum(found.paths[index].share for index in specular)
@@ -117,23 +80,24 @@ def _on_our_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate
         return UserEstimate(
             name=name,
             status="not_found",
-            reason=_why_none(strongest),
+            reason=_why_none(strongest, found.how),
             paths=_reports(found, (), {}),
         )
-    chains = {index: _chains(found.paths[index].wave.path_length, found.paths[index], room)
-              for index in specular}  # fmt: skip
-    observed = np.array([[path.wave.aoa, path.wave.path_length] for path in found.paths])
-    consistent = _consistent(chains, observed, found.covariance, room)
+    chains = {
+        index: _chains(found.paths[index].wave.path_length, found.paths[index], room, found.how)
+        for index in specular
+    }
+    consistent = _consistent(chains, found, room)
     best = _most_explained(consistent, found, chains)
     answer = _placed(name, best, found, room, chains)
-    rivals = _rivals(best, consistent, found, chains)
+    rivals = _rivals(best, consistent, found, chains, room)
     if rivals:
         return _ambiguous(
             answer,
             "paths of like strength end at different places",
             [_placed(name, rival, found, room, chains) for rival in rivals],
         )
-    others = _other_chains(best, consistent)
+    others = _other_chains(best, consistent, found.how)
     if others:
         reason = "the path meets a wall at its very end: it may pass beside it"
         if len(best.sightings) > 1:
@@ -144,22 +108,23 @@ def _on_our_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate
     if len(best.sightings) > 1:
         return answer
     (only,) = best.sightings
-    return answer if only.chain else doubt_straight_way(answer, found.paths[only.path].wave, room)
+    if only.chain:
+        return answer
+    return doubt_straight_way(answer, found.paths[only.path].wave, room, found.how)
 
 
-def _on_any_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate:
+def _on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     """Find the clock's offset from two paths, or say what one path leaves open."""
     chains = {
-        index: _chains(path.free.radius, path, room) for index, path in enumerate(found.paths)
+        index: _chains(path.radius, path, room, found.how) for index, path in enumerate(found.paths)
     }
-    observed = np.array(
-        [[path.free.aoa, path.free.path_length, path.free.radius] for path in found.paths]
-    )
-    consistent = _consistent(chains, observed, found.free_covariance, room)
+    consistent = _consistent(chains, found, room, clock_known=False)
     best = _most_explained(consistent, found, chains)
     answer = _placed(name, best, found, room, chains)
     if len(best.sightings) > 1:
-        rivals = _rivals(best, consistent, found, chains) + _other_chains(best, consistent)
+        rivals = _rivals(best, consistent, found, chains, room) + _other_chains(
+            best, consistent, found.how
+        )
         if rivals:
             return _ambiguous(
                 answer,
@@ -190,40 +155,38 @@ def _on_any_clock(name: str, found: PathSet, room: Surroundings) -> UserEstimate
     )
 
 
-def _why_none(path: Path) -> str:
-    where = f"{np.degrees(path.wave.aoa):.2f}°, {path.wave.path_length:.3f} m"
+def _why_none(path: Path, how: Bearing) -> str:
+    where = f"{how.told(path.wave.bearing)}, {path.wave.path_length:.3f} m"
     if (length := path.unfolded) is not None:
         return (
             f"the path at {where} has the curvature of one {length:.2f} m long, beyond the "
             f"unambiguous {path.unambiguous:.2f} m; take smaller frequency steps"
         )
     return (
-        f"the strongest wave ({where}) comes from a point about {path.free.radius:.2f} m away, "
+        f"the strongest wave ({where}) comes from a point about {path.radius:.2f} m away, "
         "not over that length: an edge or rough patch scatters it, and no mirror-like or direct "
         "path stands out; or the clocks differ"
     )
 
 
-Chains = dict[int, tuple[tuple[int, ...], ...]]
+Chains = dict[int, tuple[Chain, ...]]
 """For each path the chains of mirrors it may come over, the one that its ray meets first."""
 
 
-def _chains(length: float, path: Path, room: Surroundings) -> tuple[tuple[int, ...], ...]:
-    aoa, covariance = path.wave.aoa, np.zeros((2, 2))
+def _chains(length: float, path: Path, room: MapContext, how: Bearing) -> tuple[Chain, ...]:
+    bearing = path.wave.bearing
     reach = room.resolution.across_ray
-    reach += END_DEVIATIONS * float(np.sqrt(path.wave.covariance[0, 0]))
+    variance = path.wave.covariance[: bearing.size, : bearing.size].trace()
+    reach += END_DEVIATIONS * float(np.sqrt(variance))
     met = [
-        project(aoa + turn, length, room.walls, covariance=covariance).walls
-        for turn in (0.0, reach, -reach)
+        trace(how.towards(turned), length, room.walls)[1]
+        for turned in (bearing, *how.around(bearing, reach))
     ]
     return tuple(dict.fromkeys(met))
 
 
 def _consistent(
-    chains: Chains,
-    observed: Float[np.ndarray, "paths kinds"],
-    covariance: Float[np.ndarray, "observations observations"],
-    room: Surroundings,
+    chains: Chains, found: PathSet, room: MapContext, *, clock_known: bool = True
 ) -> list[Consensus]:
     """Solve all choices of paths and chains; two paths never come over the same mirrors."""
     choices = [
@@ -235,7 +198,13 @@ def _consistent(
         sightings = [one for one in choice if one is not None]
         if sightings and len({one.chain for one in sightings}) == len(sightings):
             solved = solve_position(
-                sightings, observed, covariance, room.walls, room.wall_covariance
+                sightings,
+                found.observed if clock_known else found.free_observed,
+                found.covariance if clock_known else found.free_covariance,
+                room.walls,
+                room.wall_covariance,
+                how=found.how,
+                clock_known=clock_known,
             )
             if solved.agrees:
                 consistent.append(solved)
@@ -255,7 +224,11 @@ def _most_explained(consistent: Sequence[Consensus], found: PathSet, chains: Cha
 
 
 def _rivals(
-    best: Consensus, consistent: Sequence[Consensus], found: PathSet, chains: Chains
+    best: Consensus,
+    consistent: Sequence[Consensus],
+    found: PathSet,
+    chains: Chains,
+    room: MapContext,
 ) -> list[Consensus]:
     """Return what the paths that the answer does not explain say, if they are strong."""
     rivals: list[Consensus] = []
@@ -266,7 +239,8 @@ def _rivals(
             for one in consistent
             if not used & {seen.path for seen in one.sightings}
             and _energy(one, found) > RIVAL * _energy(best, found)
-            and not _same_place(one, best)
+            and not _same_place(one, best, found.how)
+            and not _comes_unseen(one, best, found, room)
         ]
         if not others:
             return rivals
@@ -274,7 +248,24 @@ def _rivals(
         used |= {one.path for one in rivals[-1].sightings}
 
 
-def _other_chains(best: Consensus, consistent: Sequence[Consensus]) -> list[Consensus]:
+def _comes_unseen(rival: Consensus, best: Consensus, found: PathSet, room: MapContext) -> bool:
+    """Tell whether a rival's paths may come over walls that the image cannot show.
+
+    Floor and ceiling stand outside of the angles that most planar arrays image. What arrives from
+    there contradicts nothing, if it is the longer way: no place farther off than one of the
+    answer's paths is long can be the user's.
+    """
+    late = speed_of_light * (best.clock_offset or 0.0)
+    shortest = min(found.paths[one.path].wave.path_length for one in best.sightings) + late
+    if np.linalg.norm(rival.position) <= shortest:
+        return False
+    headings = [found.how.towards(found.paths[one.path].wave.bearing) for one in rival.sightings]
+    return not any(room.shows(heading) for heading in headings)
+
+
+def _other_chains(
+    best: Consensus, consistent: Sequence[Consensus], how: Bearing
+) -> list[Consensus]:
     """Return where the answer's paths end if they come over other mirrors.
 
     If two paths or more agree sharply, each of them alone over other mirrors is refuted.
@@ -283,27 +274,35 @@ def _other_chains(best: Consensus, consistent: Sequence[Consensus]) -> list[Cons
     others = []
     for one in consistent:
         theirs = {seen.path for seen in one.sightings}
-        if one is best or not theirs <= paths or _same_place(one, best):
+        if one is best or not theirs <= paths or _same_place(one, best, how):
             continue
-        if theirs < paths and _refutes(best, one):
+        if theirs < paths and _refutes(best, one, how):
             continue
         others.append(one)
     return others
 
 
-def _refutes(best: Consensus, other: Consensus) -> bool:
-    reach = np.sqrt(SAME * float(np.linalg.eigvalsh(best.covariance[:2, :2]).max()))
+def _refutes(best: Consensus, other: Consensus, how: Bearing) -> bool:
+    axes = how.coordinates
+    spread = best.covariance[np.ix_(axes, axes)]
+    reach = np.sqrt(_same(how) * float(np.linalg.eigvalsh(spread).max()))
     return bool(np.linalg.norm(best.position - other.position) > SHARP * reach)
 
 
-def _same_place(one: Consensus, other: Consensus) -> bool:
-    between = (one.position - other.position)[:2]
-    spread = (one.covariance + other.covariance)[:2, :2]
-    return bool(between @ np.linalg.solve(spread, between) < SAME)
+def _same_place(one: Consensus, other: Consensus, how: Bearing) -> bool:
+    axes = how.coordinates
+    between = (one.position - other.position)[axes]
+    spread = (one.covariance + other.covariance)[np.ix_(axes, axes)]
+    return bool(between @ np.linalg.solve(spread, between) < _same(how))
+
+
+def _same(how: Bearing) -> float:
+    """Squared distance, over its covariance, within which two positions are the same. [-]."""
+    return float(chi2.ppf(SAME, df=len(how.coordinates)))
 
 
 def _placed(
-    name: str, consensus: Consensus, found: PathSet, room: Surroundings, chains: Chains
+    name: str, consensus: Consensus, found: PathSet, room: MapContext, chains: Chains
 ) -> UserEstimate:
     """Tell where a consensus puts the user; path and angle are those of its strongest path."""
     strongest = min(consensus.sightings, key=lambda one: one.path)
@@ -315,7 +314,8 @@ def _placed(
         position=consensus.position,
         covariance=consensus.covariance,
         bounces=len(strongest.chain),
-        aoa=wave.aoa,
+        aoa=found.how.aoa(wave.bearing),
+        elevation=found.how.elevation(wave.bearing),
         path_length=wave.path_length,
         path=vertices,
         line_of_sight=any(not one.chain for one in consensus.sightings),
@@ -326,17 +326,17 @@ def _placed(
 
 
 def _vertices(
-    user: Float[np.ndarray, " 3"], chain: Sequence[Wall]
+    user: Float[np.ndarray, " 3"], chain: Sequence[FlatWall]
 ) -> Float[np.ndarray, "vertices 3"]:
     """Draw the path from the array over mirrors to the user, wherever these end. [m]."""
     images = [user]
     for wall in reversed(chain):
-        images.append(mirrored(images[-1], wall.start, wall.end))
+        images.append(wall.mirrored(images[-1]))
     place = np.zeros(3)
     vertices = [place]
     for wall, image in zip(chain, images[:0:-1], strict=True):
         ahead = image - place
-        share = float((wall.start - place) @ wall.normal) / float(ahead @ wall.normal)
+        share = float((wall.point - place) @ wall.normal) / float(ahead @ wall.normal)
         place = place + share * ahead
         vertices.append(place)
     return np.stack([*vertices, user])
@@ -360,7 +360,8 @@ def _reports(
                 reason = "a stronger path comes over the same mirrors: scattered beside it"
         reports.append(
             PathReport(
-                aoa=path.wave.aoa,
+                aoa=found.how.aoa(path.wave.bearing),
+                elevation=found.how.elevation(path.wave.bearing),
                 path_length=path.wave.path_length,
                 share=path.share,
                 mirrors=mirrors,

@@ -18,7 +18,7 @@ TILT = np.radians(20.0)
 NORMAL = np.array([np.sin(TILT), -np.cos(TILT), 0.0])
 CENTRE = np.array([0.0, 0.8, 0.0])
 HIDDEN_USER = np.array([0.35, 0.45, 0.05])
-SEEN_USER = np.array([-0.15, 0.6, -0.1])
+SEEN_USER = np.array([-0.12, 0.6, -0.1])  # at 11°, within the 13.5° that the echo images
 POST = np.array([0.1, 0.55, 0.05])
 
 
@@ -100,6 +100,65 @@ def test_a_user_over_the_wall_and_one_in_sight_are_where_they_are(estimate: Esti
         # χ² of 3 exceeds 21.1 once in 10⁴.
         assert error @ np.linalg.solve(user.covariance, error) < 21.1
         assert np.linalg.norm(error) < 5e-3  # the acceptance of the scenario room_3d
+
+
+def test_an_untold_clock_offset_gives_no_certain_wrong_place(measurement: Measurement) -> None:
+    # 30 ps are 9 mm: taken to be 0, each of both users would be found 9 mm off, to 0.1 mm.
+    user = np.array([0.1, 0.5, 0.05])
+    image = user - 2 * ((user - CENTRE) @ NORMAL) * NORMAL
+    ways = [
+        point_uplink(one[None], positions=elements(), frequencies=BAND, user="over both")
+        for one in (user, image)
+    ]
+    samples = ways[0].samples + ways[1].samples
+    power = float(np.mean(np.abs(samples) ** 2))
+    noise = complex_noise(samples.shape, 0.01 * power, np.random.default_rng(5))
+    heard = (*measurement.uplinks, replace(ways[0], samples=samples + noise))
+    ahead = np.exp(2j * np.pi * BAND * 30e-12)
+    late = tuple(replace(one, samples=one.samples * ahead) for one in heard)
+    estimate = locate(replace(measurement, uplinks=late, clock_offset=None))
+    *alone, fixed = estimate.users
+    for one in alone:
+        assert one.status == "ambiguous"
+        assert one.reason is not None
+        assert "the user's clock offset is unknown" in one.reason
+    assert fixed.status == "found", fixed.reason
+    assert fixed.position is not None
+    assert fixed.covariance is not None
+    error = fixed.position - user
+    # χ² of 3 exceeds 21.1 once in 10⁴.
+    assert error @ np.linalg.solve(fixed.covariance, error) < 21.1
+    assert fixed.clock_offset is not None
+    assert fixed.clock_deviation is not None
+    assert abs(fixed.clock_offset - 30e-12) < 4 * fixed.clock_deviation
+    assert fixed.clock_deviation < 10e-12  # a third of it: 0 is refuted
+    assert any("'over both' is unknown; its 2 paths" in note for note in estimate.notes)
+
+
+@pytest.mark.parametrize("hidden_by_a_post", [False, True])
+def test_outside_of_the_imaged_sector_the_straight_way_is_looked_at_by_itself(
+    hidden_by_a_post: bool,
+) -> None:
+    # At 25° aside the array has grating lobes at 5 mm; the wall's speckle repeats there.
+    rng = np.random.default_rng(11)
+    user = np.array([-0.28, 0.6, 0.0])
+    points, strengths = rough_wall(rng)
+    if hidden_by_a_post:
+        points, strengths = np.vstack([points, 0.6 * user]), np.append(strengths, 12.0)
+    clean = point_uplink(user[None], positions=elements(), frequencies=BAND)
+    power = float(np.mean(np.abs(clean.samples) ** 2))
+    noise = complex_noise(clean.samples.shape, 0.01 * power, rng)
+    heard = replace(clean, samples=clean.samples + noise)
+    echo = echo_of(points, strengths, rng)
+    (found,) = locate(Measurement(echo=echo, uplinks=(heard,), clock_offset=0.0)).users
+    assert found.position is not None
+    assert np.linalg.norm(found.position - user) < 1e-3
+    if hidden_by_a_post:
+        assert found.status == "ambiguous"
+        assert found.reason is not None
+        assert "on the straight way" in found.reason or "straight way passes" in found.reason
+    else:
+        assert found.status == "found", found.reason
 
 
 def test_a_post_in_front_of_the_wall_is_a_target_and_no_wall(estimate: Estimate) -> None:

@@ -1,0 +1,107 @@
+"""The stages of a linear array, whose answer lies in its plane."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.array.array_frame import ArrayFrame, array_frame
+from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
+from estimator.channel.angle_range_map_2d import (
+    angle_range_map,
+    default_angles,
+    default_path_lengths,
+)
+from estimator.channel.path_extraction_2d import find_paths
+from estimator.localization.aliasing import aliasing_notes
+from estimator.localization.stages import Heard
+from estimator.mapping.map_2d import RoomMap, build_room_map, mirrors_in_world, targets_in_world
+from estimator.mapping.map_images_2d import room_images
+from estimator.measurement.model import Echo, Measurement, Uplink
+from estimator.positioning.diffuse_fallback import with_diffuse_search
+from estimator.positioning.map_context import MapContext
+from estimator.results.estimate import (
+    AngleRangeMap,
+    CorrectedImage,
+    Image,
+    Mirror,
+    Target,
+    UserEstimate,
+)
+
+MAP_SAMPLES = 1.5
+"""Samples of the angle/range map for each -3 dB width: a peak between them loses 1.3 dB at
+most, and is refined off the grid. [-]"""
+
+
+@dataclass(frozen=True)
+class LinearRoom:
+    """What the echo of a linear array showed; see :class:`estimator.localization.stages`."""
+
+    echo: Echo
+    map: RoomMap
+
+    @cached_property
+    def context(self) -> MapContext:
+        """What users are placed in."""
+        return MapContext(
+            walls=self.map.walls,
+            wall_covariance=self.map.joint_covariance,
+            resolution=echo_resolution(self.echo),
+            imaged=True,
+            unassigned_peaks=self.map.unassigned_peaks,
+            reach=echo_reach(self.echo)[1],
+            widest=imaged_sine(self.echo),
+            contrast=self.map.survey.contrast,
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Where the image ends."""
+        spacing = float(np.ptp(self.echo.positions[:, 0])) / (len(self.echo.positions) - 1)
+        return aliasing_notes(spacing, self.echo.frequencies, imaged_sine(self.echo))
+
+    def refined(self, found: UserEstimate, uplink: Uplink) -> UserEstimate:
+        """Add what rough walls scatter of the pilot."""
+        room = self.map
+        return with_diffuse_search(found, uplink, room.lines, room.walls, room.seen_through)
+
+    def mirrors(self, frame: ArrayFrame) -> tuple[Mirror, ...]:
+        """Return the mirrors in the world's frame."""
+        return mirrors_in_world(self.map, frame)
+
+    def targets(self, frame: ArrayFrame) -> tuple[Target, ...]:
+        """Return the targets in the world's frame."""
+        return targets_in_world(self.map, frame)
+
+    def images(
+        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
+    ) -> tuple[Image, CorrectedImage]:
+        """Form both images, around the map and some paths in the array's frame."""
+        return room_images(self.echo, self.map, frame, paths)
+
+
+@dataclass(frozen=True)
+class LinearStages:
+    """The stages of a linear array."""
+
+    def frame(self, measurement: Measurement) -> ArrayFrame:
+        """Find the array's frame."""
+        measured = measurement.echo or measurement.uplinks[0]
+        return array_frame(measured.positions, measurement.boresight)
+
+    def map_room(self, echo: Echo) -> LinearRoom:
+        """Find mirrors and targets in an echo in the array's frame."""
+        return LinearRoom(echo=echo, map=build_room_map(echo))
+
+    def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[AngleRangeMap]:
+        """Map a pilot over angle and length, and take its paths out of it."""
+        chart = angle_range_map(
+            uplink,
+            aoa=default_angles(uplink, cells=MAP_SAMPLES),
+            path_length=default_path_lengths(uplink, cells=MAP_SAMPLES),
+            centre=np.zeros(3),
+        )
+        return Heard(chart=chart, paths=find_paths(uplink, chart, clock_known=clock_known))

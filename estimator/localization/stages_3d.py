@@ -1,0 +1,121 @@
+"""The stages of a planar array, which measures in space."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.array.array_frame import ArrayFrame
+from estimator.array.planar_array import (
+    PlanarArray,
+    planar_array,
+    planar_frame,
+    planar_reach,
+    planar_resolution,
+)
+from estimator.channel.angle_range_map_3d import direction_map
+from estimator.channel.path import LEAST_SHARE
+from estimator.channel.path_extraction_3d import find_space_paths
+from estimator.localization.aliasing import aliasing_notes
+from estimator.localization.stages import Heard
+from estimator.mapping.map_3d import (
+    SpaceMap,
+    build_space_map,
+    mirrors_in_world,
+    peaks_aside,
+    targets_in_world,
+)
+from estimator.mapping.map_images_3d import space_images
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.positioning.map_context import MapContext
+from estimator.results.estimate import (
+    CorrectedImage,
+    DirectionMap,
+    Image,
+    Mirror,
+    Target,
+    UserEstimate,
+)
+
+
+@dataclass(frozen=True)
+class PlanarRoom:
+    """What the echo of a planar array showed; see :class:`estimator.localization.stages`."""
+
+    echo: Echo
+    array: PlanarArray
+    map: SpaceMap
+
+    @cached_property
+    def context(self) -> MapContext:
+        """What users are placed in."""
+        return MapContext(
+            walls=self.map.walls,
+            wall_covariance=self.map.joint_covariance,
+            resolution=planar_resolution(self.array, self.echo),
+            imaged=True,
+            unassigned_peaks=self.map.unassigned_peaks,
+            reach=planar_reach(self.array, self.echo, passes=2)[1],
+            widest=self.array.unaliased(self.echo.frequencies, passes=2),
+            contrast=self.map.survey.contrast,
+            aside=lambda heading, farthest: peaks_aside(
+                self.echo, self.array, self.map, heading, farthest
+            ),
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Where the image ends."""
+        sine = self.array.unaliased(self.echo.frequencies, passes=2)
+        return aliasing_notes(max(self.array.spacing), self.echo.frequencies, sine)
+
+    def refined(self, found: UserEstimate, uplink: Uplink) -> UserEstimate:
+        """Return the answer itself: what rough walls scatter is searched in the plane only."""
+        return found
+
+    def mirrors(self, frame: ArrayFrame) -> tuple[Mirror, ...]:
+        """Return the mirrors in the world's frame."""
+        return mirrors_in_world(self.map, frame)
+
+    def targets(self, frame: ArrayFrame) -> tuple[Target, ...]:
+        """Return the targets in the world's frame."""
+        return targets_in_world(self.map, frame)
+
+    def images(
+        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
+    ) -> tuple[Image, CorrectedImage]:
+        """Read both images from the volume, around the map and some paths."""
+        return space_images(self.map, frame, planar_resolution(self.array, self.echo), paths)
+
+
+@dataclass(frozen=True)
+class PlanarStages:
+    """The stages of a planar array."""
+
+    def frame(self, measurement: Measurement) -> ArrayFrame:
+        """Find the array's frame; refuse waves of the plane and transmitters apart."""
+        if measurement.waves != "spherical":
+            raise MeasurementError(
+                f"waves = {measurement.waves!r}: a planar array measures in space, where waves are "
+                "spherical; measure with a linear array, or give the measurement its true waves"
+            )
+        if measurement.echo is not None and measurement.echo.transmit_positions is not None:
+            raise MeasurementError(
+                "echo: transmit positions stand apart; in space only a monostatic echo is imaged"
+            )
+        measured = measurement.echo or measurement.uplinks[0]
+        return planar_frame(measured.positions, measurement.boresight)
+
+    def map_room(self, echo: Echo) -> PlanarRoom:
+        """Find walls and targets in an echo in the array's frame."""
+        array = planar_array(echo.positions)
+        return PlanarRoom(echo=echo, array=array, map=build_space_map(echo, array))
+
+    def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[DirectionMap]:
+        """Map a pilot over both cosines and length, and take its paths out of it."""
+        array = planar_array(uplink.positions)
+        chart = direction_map(uplink, array, least_share=LEAST_SHARE)
+        paths = find_space_paths(uplink, array, chart, clock_known=clock_known)
+        return Heard(chart=chart, paths=paths)
