@@ -1,5 +1,7 @@
 """The stepped-frequency radio: its band and its frequencies."""
 
+from typing import Literal
+
 import numpy as np
 from jaxtyping import Float
 from pydantic import Field, model_validator
@@ -12,12 +14,21 @@ MOST_POINTS = 100_000
 """Most frequency points; 20 times what the longest sweep of the laboratory has."""
 
 
+Polarization = Literal["vertical", "horizontal"]
+"""Electric field of all antennas: along z, or across z and the direction (in 2-D scenes: TM and TE
+of the cross-section)."""
+
+
 class Radio(Checked):
     """Stepped-frequency radio."""
 
     start_ghz: float = Field(ge=0.1, le=3000, description="the first frequency [GHz]")
     stop_ghz: float = Field(ge=0.1, le=3000, description="the last frequency [GHz]")
     points: int = Field(ge=2, le=MOST_POINTS, description="the number of frequencies")
+    polarization: Polarization = Field(
+        default="vertical",
+        description="electric field of all antennas, along z or across it (2-D scenes only)",
+    )
 
     @model_validator(mode="after")
     def _a_band(self) -> "Radio":

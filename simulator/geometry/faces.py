@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from scenes.schema.radio import Polarization
 from simulator.geometry.facets import Facets
 from simulator.materials.layered_media import Material
 
@@ -14,6 +15,7 @@ class Face:
     """One side of a surface of line facets."""
 
     centres: Float[np.ndarray, "facets 2"]  # [m]
+    places: Float[np.ndarray, "facets 2"]  # where rays start, on the mean surface [m]
     normals: Float[np.ndarray, "facets 2"]  # unit vectors, to the side that scatters
     sizes: Float[np.ndarray, " facets"]  # what each stands for in a sum over the surface [m]
     edges: Float[np.ndarray, "facets 2"]  # [m]
@@ -21,6 +23,8 @@ class Face:
     surface: int  # which object the face belongs to
     side: int  # 1: outer, or first; -1: the back of an open surface
     material: Material
+    rough: Bool[np.ndarray, " facets"]  # their normals and sizes are those of the mean course
+    polarization: Polarization
 
     @property
     def count(self) -> int:
@@ -32,11 +36,12 @@ class Face:
         return Face(
             **{
                 name: getattr(self, name)[chosen]
-                for name in ("centres", "normals", "sizes", "edges", "source")
+                for name in ("centres", "places", "normals", "sizes", "edges", "source", "rough")
             },
             surface=self.surface,
             side=self.side,
             material=self.material,
+            polarization=self.polarization,
         )
 
 
@@ -48,6 +53,7 @@ def two_faces(
     return tuple(
         Face(
             centres=facets.centres[chosen, :2],
+            places=facets.places[chosen, :2],
             normals=side * facets.normals[chosen, :2],
             sizes=facets.sizes[chosen],
             edges=facets.edges[chosen, 0, :2],
@@ -55,6 +61,8 @@ def two_faces(
             surface=surface,
             side=side,
             material=material,
+            rough=facets.rough[chosen],
+            polarization=facets.polarization,
         )
         for side in sides
     )

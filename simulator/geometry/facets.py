@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from scenes.realisations.object_surface import Surface
+from scenes.schema.radio import Polarization
+from simulator.geometry.profile_lines import Edge, Run, outline
 from simulator.materials.layered_media import Conductor, Material
 
 CELLS_AT_ONCE = 1_000_000
@@ -24,6 +27,27 @@ class Facets:
     two_sided: Bool[np.ndarray, " facets"]
     materials: tuple[Material, ...] = (Conductor(),)
     material: Int[np.ndarray, " facets"] | None = None  # index; None: all are the first
+    mean_centres: Float[np.ndarray, "facets 3"] | None = None  # of lines; None: the centres [m]
+    runs: tuple[Run, ...] = ()  # of lines: what lies in one course
+    corners: tuple[Edge, ...] = ()  # of lines: where such courses end
+    polarization: Polarization = "vertical"  # of lines
+
+    @property
+    def places(self) -> Float[np.ndarray, "facets 3"]:
+        """Where rays start: a surface does not hide itself by its own roughness. [m]."""
+        return self.centres if self.mean_centres is None else self.mean_centres
+
+    @cached_property
+    def rough(self) -> Bool[np.ndarray, " facets"]:
+        """Which lines stand for a course with heights; their normals and sizes are its."""
+        rough = np.zeros(self.count, dtype=bool)
+        for run in self.runs:
+            rough[run.facets] = run.rough
+        return rough
+
+    def material_of(self, facet: int) -> Material:
+        """Return what one facet is made of."""
+        return self.materials[0 if self.material is None else int(self.material[facet])]
 
     @property
     def count(self) -> int:
@@ -31,9 +55,12 @@ class Facets:
         return len(self.sizes)
 
     def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Facets":
-        """Choose some of the facets."""
+        """Choose some of the facets; lines then stand by themselves, without edges."""
         return replace(
             self,
+            mean_centres=None if self.mean_centres is None else self.mean_centres[chosen],
+            runs=(),
+            corners=(),
             centres=self.centres[chosen],
             normals=self.normals[chosen],
             sizes=self.sizes[chosen],
@@ -73,7 +100,12 @@ def _both_conduct(one: Material, other: Material) -> bool:
     return isinstance(one, Conductor) and isinstance(other, Conductor)
 
 
-def surface_facets(surface: Surface, material: Material | None = None) -> Facets:
+def surface_facets(
+    surface: Surface,
+    material: Material | None = None,
+    *,
+    polarization: Polarization = "vertical",
+) -> Facets:
     """Make a facet of each cell of a surface (line cells: 2-D, triangles: 3-D).
 
     Parameters
@@ -82,18 +114,25 @@ def surface_facets(surface: Surface, material: Material | None = None) -> Facets
         The surface, as it is displaced.
     material
         What all of it is made of; by default a conductor.
+    polarization
+        Of the antennas, where these are lines.
     """
-    made = scene_facets([(surface, Conductor() if material is None else material)])
+    of = Conductor() if material is None else material
+    made = scene_facets([(surface, of)], polarization=polarization)
     return replace(made, material=None)
 
 
-def scene_facets(surfaces: Sequence[tuple[Surface, Material]]) -> Facets:
+def scene_facets(
+    surfaces: Sequence[tuple[Surface, Material]], *, polarization: Polarization = "vertical"
+) -> Facets:
     """Make facets of the cells of several surfaces, one material for each of them.
 
     Parameters
     ----------
     surfaces
         At least one, all lines or all triangles, and what each is made of.
+    polarization
+        Of the antennas, where these are lines.
     """
     sides = surfaces[0][0].cells.shape[1] - 1
     ends = np.cumsum([len(surface.cells) for surface, _ in surfaces])
@@ -107,32 +146,52 @@ def scene_facets(surfaces: Sequence[tuple[Surface, Material]]) -> Facets:
         two_sided=np.empty(count, dtype=bool),
         materials=tuple(material for _, material in surfaces),
         material=np.empty(count, dtype=np.int16),
+        polarization=polarization,
     )
+    runs: list[Run] = []
+    corners: list[Edge] = []
+    mean_centres = np.empty((count, 3)) if sides == 1 else None
     for index, ((surface, _), end) in enumerate(zip(surfaces, ends.tolist(), strict=True)):
         start = end - len(surface.cells)
         facets.two_sided[start:end] = not surface.closed
         if facets.material is not None:
             facets.material[start:end] = index
+        if mean_centres is not None:
+            lines = outline(surface, start)
+            here = slice(start, end)
+            facets.centres[here], facets.normals[here] = lines.centres, lines.normals
+            facets.sizes[here], facets.edges[here] = lines.sizes, lines.edges
+            mean_centres[here] = lines.mean_centres
+            runs += lines.runs
+            corners += _renumbered(lines.corners, facets=0, edges=len(corners))
+            continue
         for first in range(start, end, CELLS_AT_ONCE):
             last = min(first + CELLS_AT_ONCE, end)
             cells = surface.cells[first - start : last - start]
             _fill(facets, slice(first, last), surface.vertices[cells])
-    return facets
+    if mean_centres is None:
+        return facets
+    return replace(facets, mean_centres=mean_centres, runs=tuple(runs), corners=tuple(corners))
+
+
+def _renumbered(corners: Sequence[Edge], *, facets: int, edges: int) -> list[Edge]:
+    """Count facets and edges in a larger set, in which these begin there."""
+    return [
+        replace(
+            edge,
+            facets=tuple(facet + facets for facet in edge.facets),
+            partner=edge.partner if edge.partner < 0 else edge.partner + edges,
+        )
+        for edge in corners
+    ]
 
 
 def _fill(facets: Facets, some: slice, corners: Float[np.ndarray, "cells corners 3"]) -> None:
     edges = corners[:, 1:] - corners[:, :1]
-    if edges.shape[1] == 1:
-        along = edges[:, 0]
-        across = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
-        sizes = np.linalg.norm(along, axis=-1)
-        normals = across / sizes[:, None]
-    else:
-        across = np.cross(edges[:, 0], edges[:, 1])
-        doubled = np.linalg.norm(across, axis=-1)
-        sizes, normals = doubled / 2, across / doubled[:, None]
-    facets.centres[some], facets.normals[some] = corners.mean(axis=1), normals
-    facets.sizes[some], facets.edges[some] = sizes, edges
+    across = np.cross(edges[:, 0], edges[:, 1])
+    doubled = np.linalg.norm(across, axis=-1)
+    facets.centres[some], facets.normals[some] = corners.mean(axis=1), across / doubled[:, None]
+    facets.sizes[some], facets.edges[some] = doubled / 2, edges
 
 
 def joined(parts: Sequence[Facets]) -> Facets:
@@ -141,10 +200,19 @@ def joined(parts: Sequence[Facets]) -> Facets:
     Raises
     ------
     ValueError
-        If there are none.
+        If there are none, or of several polarizations.
     """
     if not parts:
         raise ValueError("no facets to join: the scene has no scattering object")
+    polarizations = {part.polarization for part in parts}
+    if len(polarizations) > 1:
+        raise ValueError("facets of several polarizations cannot be joined; make all of one")
+    starts = np.cumsum([0, *(part.count for part in parts)]).tolist()
+    runs: list[Run] = []
+    corners: list[Edge] = []
+    for start, part in zip(starts, parts, strict=False):
+        runs += (replace(run, facets=run.facets + start) for run in part.runs)
+        corners += _renumbered(part.corners, facets=start, edges=len(corners))
     first = np.cumsum([0, *(len(part.materials) for part in parts)])
     indices = [
         start + (np.zeros(part.count, dtype=np.int64) if part.material is None else part.material)
@@ -158,17 +226,26 @@ def joined(parts: Sequence[Facets]) -> Facets:
         two_sided=np.concatenate([part.two_sided for part in parts]),
         materials=tuple(material for part in parts for material in part.materials),
         material=np.concatenate(indices),
+        mean_centres=np.concatenate([part.places for part in parts]) if parts[0].flat else None,
+        runs=tuple(runs),
+        corners=tuple(corners),
+        polarization=polarizations.pop(),
     )
 
 
 def profile_surface(profile: Float[np.ndarray, "vertices 3"], *, name: str = "wall") -> Surface:
-    """Make an open conducting surface of a measured or computed wall profile in 2-D. [m]."""
+    """Make an open conducting surface of a measured or computed wall profile in 2-D. [m].
+
+    Its mean course is the line between its ends.
+    """
     first = np.arange(len(profile) - 1)
+    along = profile[-1] - profile[0]
+    shares = (profile - profile[0]) @ along / (along @ along)
     return Surface(
         name=name,
         material="metal",
         vertices=profile,
-        mean_vertices=profile,
+        mean_vertices=profile[0] + shares[:, None] * along,
         cells=np.stack([first, first + 1], axis=-1),
         closed=False,
     )

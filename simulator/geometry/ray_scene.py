@@ -1,7 +1,7 @@
 """The scene that rays are traced in: a Sionna RT scene of the scenario's surfaces."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -57,19 +57,23 @@ class RayScene:
         return np.asarray(points - self.centre)
 
 
-def build_scene(surfaces: Sequence[Surface]) -> RayScene:
+def build_scene(surfaces: Sequence[Surface], *, mean: bool = False) -> RayScene:
     """Build the scene that rays are tested in; each surface becomes an object of its name.
 
     Parameters
     ----------
     surfaces
         Lines become upright strips.
+    mean
+        Leave the roughness out.
 
     Raises
     ------
     ValueError
         If two surfaces have one name.
     """
+    if mean:
+        surfaces = [replace(surface, vertices=surface.mean_vertices) for surface in surfaces]
     points = np.concatenate([np.zeros((0, 3)), *(surface.vertices for surface in surfaces)])
     centre, extent = np.zeros(3), 0.0
     if len(points):
@@ -183,7 +187,7 @@ def facets_visible(
         visible[:] = True
         return visible
     points = rays.about_centre(points)
-    centres, normals = _double(rays.about_centre(facets.centres)), _double(facets.normals)
+    centres, normals = _double(rays.about_centre(facets.places)), _double(facets.normals)
     chunk = max(1, RAYS_AT_ONCE // facets.count)
     for first in range(0, len(points), chunk):
         some = points[first : first + chunk]

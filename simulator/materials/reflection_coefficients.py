@@ -7,7 +7,8 @@ lobe this is the angle of incidence itself; elsewhere it is the one choice that 
 both legs alike, so that the link stays reciprocal. An echo to where it came from is thus
 reflected as at normal incidence, by the little mirrors that face the antenna.
 
-In two dimensions the field is along z, across the plane of incidence (TE). In three, the
+In two dimensions the electric field is along z, across the plane of incidence (TE), or the magnetic
+one is (TM). In three, the
 antennas' vertical fields are split at that mirror,
 
 .. math:: \Gamma = (\hat e_r \cdot \hat s)(\hat s \cdot \hat e_t)\, \Gamma_{TE}
@@ -21,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Complex, Float
 
+from scenes.schema.radio import Polarization as Polarization2D
 from simulator.materials.layered_media import Coefficients, Conductor, Material, reflection
 from simulator.materials.permittivity import MaterialError
 from simulator.numerics.nufft_sum import ACCURACY, barycentric_basis, chebyshev_nodes
@@ -86,6 +88,7 @@ def facet_coefficients(
     frequencies: Float[np.ndarray, " nodes"],
     *,
     flat: bool,
+    polarization: Polarization2D = "vertical",
 ) -> Float[np.ndarray, "1 facets"] | Complex[np.ndarray, "nodes facets"]:
     """Reflection coefficient of each facet at each frequency; one row if it does not vary.
 
@@ -98,16 +101,18 @@ def facet_coefficients(
     frequencies
         Any grid. [Hz]
     flat
-        Two dimensions: the field is along z.
+        Two dimensions.
+    polarization
+        Of the antennas, in two dimensions: the electric field is along z, or the magnetic one.
     """
     if isinstance(material, Conductor):
         if flat:
-            return np.full((1, len(transmit)), -1.0)
+            return np.full((1, len(transmit)), -1.0 if polarization == "vertical" else 1.0)
         shares = vertical_polarization(transmit, receive)
         return np.asarray(shares.tm - shares.te)[None]
     both = _over_angles(material, frequencies, half_angle_cosine(transmit, receive))
     if flat:
-        return both.te
+        return both.te if polarization == "vertical" else both.tm
     shares = vertical_polarization(transmit, receive)
     return np.asarray(shares.te * both.te + shares.tm * both.tm)
 
@@ -137,10 +142,14 @@ def _over_angles(
 
 
 def echo_coefficient(
-    material: Material, frequencies: Float[np.ndarray, " freqs"]
+    material: Material,
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    polarization: Polarization2D = "vertical",
 ) -> Complex[np.ndarray, " freqs"]:
     """Reflection coefficient for an echo to where it came from: at normal incidence. [-]."""
-    coefficient: np.ndarray = reflection(material, frequencies, np.ones(1)).te[0]
+    both = reflection(material, frequencies, np.ones(1))
+    coefficient: np.ndarray = (both.te if polarization == "vertical" else both.tm)[0]
     return coefficient
 
 

@@ -36,6 +36,8 @@ from simulator.materials.reflection_coefficients import (
     reflection_nodes,
 )
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
+from simulator.scattering.edge_diffraction import edge_echo, edge_view
+from simulator.scattering.small_slope import RoughLine
 from simulator.scattering.triangle_transform import triangle_transform
 
 SAMPLES_AT_ONCE = 4_000_000
@@ -51,6 +53,11 @@ its points about the centroid. [-]"""
 
 MOST_TRIED, MARGIN = 16, 1.1
 """Links of which the facets' slopes are looked at, and what the others may exceed them by."""
+
+
+ROUGH_NODES = 4
+"""Fewest frequencies that the weights of rough lines are sampled at: over a third of an octave they
+are then interpolated to 1e-3 of what they add to the tangent plane's. [-]"""
 
 
 def scattered(
@@ -87,7 +94,7 @@ def scattered(
     count = nodes_needed(2 * facets.extent / speed_of_light, stop - start)
     count += transmit.nodes + receive.nodes - 2  # degrees of a product add up
     parts = [
-        _Part(material, mask, count, frequencies, monostatic=monostatic)
+        _Part(facets, material, mask, count, frequencies, monostatic=monostatic)
         for material, mask in facets.by_material
         if not isinstance(material, Absorber)
     ]
@@ -104,6 +111,12 @@ def scattered(
         for part in parts:
             chosen = lit if part.mask is None else lit & part.mask
             spectrum += _partial_link(facets, chosen, inward, outward, part, waves)
+        if facets.corners:
+            views = (
+                edge_view(facets.corners, transmit, index if shared is None else 0, frequencies),
+                edge_view(facets.corners, receive, index, frequencies),
+            )
+            spectrum += edge_echo(facets.corners, facets, lit, views, frequencies, waves=waves)
         advance()
         return spectrum
 
@@ -179,6 +192,7 @@ class _Part:
 
     def __init__(
         self,
+        facets: Facets,
         material: Material,
         mask: Bool[np.ndarray, " facets"] | None,
         count: int,
@@ -188,18 +202,36 @@ class _Part:
     ) -> None:
         self.material, self.mask, self.count = material, mask, count
         self.frequencies, self.monostatic = frequencies, monostatic
-        # Towards where it came from, all facets reflect alike: the sum is multiplied once.
+        self.polarization = facets.polarization
+        self.runs = [
+            run for run in facets.runs if run.rough and (mask is None or mask[run.facets[0]])
+        ]
+        if self.runs:
+            self.count = max(count, ROUGH_NODES)
+        # Towards where it came from, smooth facets reflect alike: the sum is multiplied once.
         self.common: Complex[np.ndarray, " freqs"] | None = None
-        if monostatic and not isinstance(material, Conductor):
-            self.common = echo_coefficient(material, frequencies)
+        if monostatic and not isinstance(material, Conductor) and not self.runs:
+            self.common = echo_coefficient(material, frequencies, polarization=self.polarization)
         self._totals: dict[float, FrequencySum] = {}
+        self._lines: dict[float, list[RoughLine]] = {}
         self._lock = threading.Lock()
 
-    def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
-        """Return the sum that samples the band as finely as these facets' angles need it."""
-        same = self.monostatic or isinstance(self.material, Conductor)
-        legs = inward.direction[lit], outward.direction[lit]
-        lowest = 1.0 if same else angle_class(half_angle_cosine(*legs))
+    def total(
+        self, inward: "_Leg", outward: "_Leg", lit: np.ndarray
+    ) -> tuple[FrequencySum, list[RoughLine]]:
+        """Return the sum that samples the band as finely as these facets' angles need it.
+
+        With it, the rough lines sampled at its nodes.
+        """
+        same = self.common is not None or isinstance(self.material, Conductor)
+        lowest = 1.0
+        if not same:
+            legs = inward.direction[lit], outward.direction[lit]
+            cosines = half_angle_cosine(*legs)
+            if self.runs:
+                ends = np.abs(inward.cosine[lit]), np.abs(outward.cosine[lit])
+                cosines = np.concatenate([cosines, *ends])
+            lowest = angle_class(cosines)
         with self._lock:
             if lowest not in self._totals:
                 start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
@@ -208,9 +240,55 @@ class _Part:
                     count += reflection_nodes(self.material, start, stop, lowest=lowest) - 1
                 nodes = chebyshev_nodes(start, stop, count)
                 self._totals[lowest] = FrequencySum(self.frequencies, nodes)
-            return self._totals[lowest]
+                self._lines[lowest] = [
+                    RoughLine(
+                        heights=run.heights,
+                        step=run.step,
+                        closed=run.closed,
+                        material=self.material,
+                        polarization=self.polarization,
+                        nodes=nodes,
+                    )
+                    for run in self.runs
+                ]
+            return self._totals[lowest], self._lines[lowest]
 
-    def coefficients(
+    def weights(
+        self,
+        inward: "_Leg",
+        outward: "_Leg",
+        some: np.ndarray,
+        lines: list[RoughLine],
+        nodes: Float[np.ndarray, " nodes"],
+        facets: Facets,
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        """Obliquity times reflection of smooth facets, and what stands for it on rough lines."""
+        smooth = ~facets.rough[some]
+        if not self.runs or smooth.all():
+            obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
+            return obliquity * self._coefficients(inward, outward, some, nodes, flat=facets.flat)
+        weights = np.empty((nodes.size, some.size), dtype=np.complex128)
+        if smooth.any():
+            weights[:, smooth] = self.weights(inward, outward, some[smooth], [], nodes, facets)
+        for run, line in zip(self.runs, lines, strict=True):
+            first, last = np.searchsorted(some, [run.facets.min(), run.facets.max() + 1])
+            chosen = np.arange(first, last)[np.isin(some[first:last], run.facets)]
+            if chosen.size == 0:
+                continue
+            order = np.argsort(run.facets)
+            here = order[np.searchsorted(run.facets, some[chosen], sorter=order)]
+            side = np.sign(inward.cosine[some[chosen]])
+            ways = []
+            for leg in (inward, outward):
+                direction, normal = leg.direction[some[chosen]], facets.normals[some[chosen]]
+                along = direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1]
+                ways.append((along, np.abs(leg.cosine[some[chosen]])))
+            weights[:, chosen] = line.weights(
+                ways[0], ways[1], here, side=side, monostatic=self.monostatic
+            )
+        return weights
+
+    def _coefficients(
         self,
         inward: "_Leg",
         outward: "_Leg",
@@ -220,10 +298,14 @@ class _Part:
         flat: bool,
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
         """Reflect at the nodes; what is common to all facets is left out."""
-        if self.monostatic:
-            return np.full((1, len(some)), -1.0 if self.common is None else 1.0)
+        if self.common is not None:
+            return np.ones((1, len(some)))
+        if self.monostatic and isinstance(self.material, Conductor):
+            return np.full((1, len(some)), -1.0 if self.polarization == "vertical" else 1.0)
         legs = inward.direction[some], outward.direction[some]
-        return facet_coefficients(self.material, *legs, nodes, flat=flat)
+        return facet_coefficients(
+            self.material, *legs, nodes, flat=flat, polarization=self.polarization
+        )
 
 
 class _Leg:
@@ -256,7 +338,7 @@ def _partial_link(
     waves: Waves,
 ) -> Complex[np.ndarray, " freqs"]:
     lit = np.flatnonzero(chosen)
-    add_up = part.total(inward, outward, lit)
+    add_up, lines = part.total(inward, outward, lit)
     nodes = add_up.nodes
     total = np.zeros(part.frequencies.size, dtype=np.complex128)
     at_once = max(1, SAMPLES_AT_ONCE // nodes.size)
@@ -264,8 +346,7 @@ def _partial_link(
         some = lit[first : first + at_once]
         lengths = inward.distance[some] + outward.distance[some]
         product = inward.distance[some] * outward.distance[some]
-        obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
-        amplitude = obliquity * facets.sizes[some] / (8 * np.pi)
+        amplitude = facets.sizes[some] / (8 * np.pi)
         if not facets.flat:  # (jk/λ)(λ/4π)² = j/(8π)
             amplitude = amplitude / product
         elif waves == "spherical":  # √(λ/L) e^{jπ/4} times the cylindrical wave
@@ -276,7 +357,7 @@ def _partial_link(
         slope = (inward.direction[some] + outward.direction[some])[:, None, :] * facets.edges[some]
         advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
         shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
-        shape = shape * part.coefficients(inward, outward, some, nodes, flat=facets.flat)
+        shape = shape * part.weights(inward, outward, some, lines, nodes, facets)
         total += add_up(lengths / speed_of_light, amplitude * gain * shape)
     if part.common is not None:
         total *= part.common

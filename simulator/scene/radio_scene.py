@@ -91,8 +91,11 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
             scattering[name] = (surface, material)
     return RadioScene(
         scenario=scenario,
-        rays=build_scene(surfaces),
-        facets=scene_facets(list(scattering.values())) if scattering else None,
+        # In two dimensions roughness is the weights' business, and hides nothing.
+        rays=build_scene(surfaces, mean=scenario.dimensions == 2),
+        facets=scene_facets(list(scattering.values()), polarization=scenario.radio.polarization)
+        if scattering
+        else None,
         elements=elements,
         scattering=tuple(scattering),
         mirrors=mirrors,

@@ -70,11 +70,11 @@ def facets_see_each_other(rays: RayScene, one: Face, other: Face) -> Bool[np.nda
             "max_bounces = 1"
         )
     seen = np.zeros((one.count, other.count), dtype=bool)
-    starts, ends = (face.centres + rays.clearance * face.normals for face in (one, other))
+    starts, ends = (face.places + rays.clearance * face.normals for face in (one, other))
     rows = max(1, RAYS_AT_ONCE // max(other.count, 1))
     for first in range(0, one.count, rows):
         block = slice(first, first + rows)
-        apart = other.centres - one.centres[block, None]
+        apart = other.places - one.places[block, None]
         leaves = np.einsum("abx,ax->ab", apart, one.normals[block]) > 0
         arrives = np.einsum("abx,bx->ab", apart, other.normals) < 0
         some, others = np.nonzero(leaves & arrives)
