@@ -162,7 +162,7 @@ def scene_facets(
             facets.centres[here], facets.normals[here] = lines.centres, lines.normals
             facets.sizes[here], facets.edges[here] = lines.sizes, lines.edges
             mean_centres[here] = lines.mean_centres
-            runs += lines.runs
+            runs += (replace(run, count=count) for run in lines.runs)
             corners += _renumbered(lines.corners, facets=0, edges=len(corners))
             continue
         for first in range(start, end, CELLS_AT_ONCE):
@@ -211,7 +211,9 @@ def joined(parts: Sequence[Facets]) -> Facets:
     runs: list[Run] = []
     corners: list[Edge] = []
     for start, part in zip(starts, parts, strict=False):
-        runs += (replace(run, facets=run.facets + start) for run in part.runs)
+        runs += (
+            replace(run, facets=run.facets + start, count=starts[-1]) for run in part.runs
+        )
         corners += _renumbered(part.corners, facets=start, edges=len(corners))
     first = np.cumsum([0, *(len(part.materials) for part in parts)])
     indices = [

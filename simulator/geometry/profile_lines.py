@@ -11,6 +11,7 @@ at a convex angle, a wedge.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,6 +34,14 @@ class Run:
     heights: Float[np.ndarray, " run"]  # of the centres over the mean course [m]
     step: float  # along the mean course [m]
     closed: bool
+    count: int = 0  # of the whole set
+
+    @cached_property
+    def places(self) -> Int[np.ndarray, " facets"]:
+        """Where each facet of the whole set lies on this run; -1: elsewhere."""
+        places = np.full(self.count, -1, dtype=np.int64)
+        places[self.facets] = np.arange(self.facets.size)
+        return places
 
     @property
     def rough(self) -> bool:

@@ -110,14 +110,14 @@ def facet_coefficients(
             return np.full((1, len(transmit)), -1.0 if polarization == "vertical" else 1.0)
         shares = vertical_polarization(transmit, receive)
         return np.asarray(shares.tm - shares.te)[None]
-    both = _over_angles(material, frequencies, half_angle_cosine(transmit, receive))
+    both = over_angles(material, frequencies, half_angle_cosine(transmit, receive))
     if flat:
         return both.te if polarization == "vertical" else both.tm
     shares = vertical_polarization(transmit, receive)
     return np.asarray(shares.te * both.te + shares.tm * both.tm)
 
 
-def _over_angles(
+def over_angles(
     material: Material, frequencies: Float[np.ndarray, " nodes"], cosines: Float[np.ndarray, " n"]
 ) -> Coefficients:
     """Reflection coefficients [nodes, n], interpolated between angles where those are many."""

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from estimator.compute.engine import thread_count
@@ -37,7 +37,12 @@ from simulator.materials.reflection_coefficients import (
 )
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
 from simulator.scattering.edge_diffraction import edge_echo, edge_view
-from simulator.scattering.small_slope import RoughLine
+from simulator.scattering.small_slope import (
+    MOST_ALONG,
+    GridOfWeights,
+    RoughLine,
+    reflection_of_front,
+)
 from simulator.scattering.triangle_transform import triangle_transform
 
 SAMPLES_AT_ONCE = 4_000_000
@@ -208,26 +213,20 @@ class _Part:
         ]
         if self.runs:
             self.count = max(count, ROUGH_NODES)
-        # Towards where it came from, smooth facets reflect alike: the sum is multiplied once.
+        # Towards where it came from, facets reflect alike: the sum is multiplied once.
         self.common: Complex[np.ndarray, " freqs"] | None = None
-        if monostatic and not isinstance(material, Conductor) and not self.runs:
+        if monostatic and not isinstance(material, Conductor):
             self.common = echo_coefficient(material, frequencies, polarization=self.polarization)
         self._totals: dict[float, FrequencySum] = {}
-        self._lines: dict[float, list[RoughLine]] = {}
+        self._grids: dict[tuple[int, int, float, float], GridOfWeights] = {}
         self._lock = threading.Lock()
 
-    def total(
-        self, inward: "_Leg", outward: "_Leg", lit: np.ndarray
-    ) -> tuple[FrequencySum, list[RoughLine]]:
-        """Return the sum that samples the band as finely as these facets' angles need it.
-
-        With it, the rough lines sampled at its nodes.
-        """
-        same = self.common is not None or isinstance(self.material, Conductor)
+    def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
+        """Return the sum that samples the band as finely as these facets' angles need it."""
+        same = self.monostatic or isinstance(self.material, Conductor)
         lowest = 1.0
         if not same:
-            legs = inward.direction[lit], outward.direction[lit]
-            cosines = half_angle_cosine(*legs)
+            cosines = half_angle_cosine(inward.direction[lit], outward.direction[lit])
             if self.runs:
                 ends = np.abs(inward.cosine[lit]), np.abs(outward.cosine[lit])
                 cosines = np.concatenate([cosines, *ends])
@@ -240,53 +239,67 @@ class _Part:
                     count += reflection_nodes(self.material, start, stop, lowest=lowest) - 1
                 nodes = chebyshev_nodes(start, stop, count)
                 self._totals[lowest] = FrequencySum(self.frequencies, nodes)
-                self._lines[lowest] = [
-                    RoughLine(
-                        heights=run.heights,
-                        step=run.step,
-                        closed=run.closed,
-                        material=self.material,
-                        polarization=self.polarization,
-                        nodes=nodes,
-                    )
-                    for run in self.runs
-                ]
-            return self._totals[lowest], self._lines[lowest]
+            return self._totals[lowest]
 
     def weights(
         self,
         inward: "_Leg",
         outward: "_Leg",
         some: np.ndarray,
-        lines: list[RoughLine],
         nodes: Float[np.ndarray, " nodes"],
         facets: Facets,
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
         """Obliquity times reflection of smooth facets, and what stands for it on rough lines."""
-        smooth = ~facets.rough[some]
-        if not self.runs or smooth.all():
-            obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
-            return obliquity * self._coefficients(inward, outward, some, nodes, flat=facets.flat)
+        smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
+        obliquity = np.abs(inward.cosine[some[smooth]] + outward.cosine[some[smooth]])
+        flat = obliquity * self._coefficients(inward, outward, some[smooth], nodes, flat=facets.flat)
+        if smooth.size == some.size:
+            return flat
         weights = np.empty((nodes.size, some.size), dtype=np.complex128)
-        if smooth.any():
-            weights[:, smooth] = self.weights(inward, outward, some[smooth], [], nodes, facets)
-        for run, line in zip(self.runs, lines, strict=True):
-            first, last = np.searchsorted(some, [run.facets.min(), run.facets.max() + 1])
-            chosen = np.arange(first, last)[np.isin(some[first:last], run.facets)]
-            if chosen.size == 0:
-                continue
-            order = np.argsort(run.facets)
-            here = order[np.searchsorted(run.facets, some[chosen], sorter=order)]
-            side = np.sign(inward.cosine[some[chosen]])
-            ways = []
-            for leg in (inward, outward):
-                direction, normal = leg.direction[some[chosen]], facets.normals[some[chosen]]
-                along = direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1]
-                ways.append((along, np.abs(leg.cosine[some[chosen]])))
-            weights[:, chosen] = line.weights(
-                ways[0], ways[1], here, side=side, monostatic=self.monostatic
-            )
+        weights[:, smooth] = flat
+        for number, run in enumerate(self.runs):
+            chosen = np.flatnonzero(run.places[some] >= 0)
+            for side in (1.0, -1.0):
+                here = chosen[np.sign(inward.cosine[some[chosen]]) == side]
+                if here.size:
+                    grid = self._grid(number, inward, side, nodes, facets)
+                    along = outward.along(facets, some[here])
+                    weights[:, here] = grid(along, run.places[some[here]])
+        if self.common is not None:
+            half = reflection_of_front(self.material, nodes, polarization=self.polarization)
+            weights[:, facets.rough[some]] /= half[:, None]
         return weights
+
+    def _grid(
+        self,
+        number: int,
+        inward: "_Leg",
+        side: float,
+        nodes: Float[np.ndarray, " nodes"],
+        facets: Facets,
+    ) -> GridOfWeights:
+        """Weights of a run for one transmitter: kept while it is the same one."""
+        run = self.runs[number]
+        key = (number, 0 if self.monostatic else id(inward), side, float(nodes.size))
+        with self._lock:
+            if key not in self._grids:
+                line = RoughLine(
+                    heights=run.heights,
+                    step=run.step,
+                    closed=run.closed,
+                    material=self.material,
+                    polarization=self.polarization,
+                    nodes=nodes,
+                )
+                sent = None
+                if not self.monostatic:
+                    # Where the run turns away from the transmitter, its weights are not asked for.
+                    grazing = 1 - MOST_ALONG**2
+                    cosine = np.maximum(side * inward.cosine[run.facets], np.sqrt(grazing))
+                    sent = inward.along(facets, run.facets), cosine
+                    self._grids = {k: grid for k, grid in self._grids.items() if k[1] == key[1]}
+                self._grids[key] = GridOfWeights(line, sent, side)
+            return self._grids[key]
 
     def _coefficients(
         self,
@@ -320,6 +333,13 @@ class _Leg:
         self.pattern = ports.pattern
         self._gains: dict[int, np.ndarray] = {}
 
+    def along(
+        self, facets: Facets, some: Int[np.ndarray, " chosen"]
+    ) -> Float[np.ndarray, " chosen"]:
+        """Component of the direction along a line's mean course. [-]."""
+        direction, normal = self.direction[some], facets.normals[some]
+        return np.asarray(direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1])
+
     def gain(
         self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
@@ -338,7 +358,7 @@ def _partial_link(
     waves: Waves,
 ) -> Complex[np.ndarray, " freqs"]:
     lit = np.flatnonzero(chosen)
-    add_up, lines = part.total(inward, outward, lit)
+    add_up = part.total(inward, outward, lit)
     nodes = add_up.nodes
     total = np.zeros(part.frequencies.size, dtype=np.complex128)
     at_once = max(1, SAMPLES_AT_ONCE // nodes.size)
@@ -357,7 +377,7 @@ def _partial_link(
         slope = (inward.direction[some] + outward.direction[some])[:, None, :] * facets.edges[some]
         advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
         shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
-        shape = shape * part.weights(inward, outward, some, lines, nodes, facets)
+        shape = shape * part.weights(inward, outward, some, nodes, facets)
         total += add_up(lengths / speed_of_light, amplitude * gain * shape)
     if part.common is not None:
         total *= part.common

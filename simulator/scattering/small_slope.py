@@ -49,16 +49,17 @@ References
    Soc. Am. 75, 1984.
 """
 
+import math
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from scenes.schema.radio import Polarization
-from simulator.materials.layered_media import Conductor, Dielectric, Material, reflection, slab
-from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
+from simulator.materials.layered_media import Dielectric, Material
+from simulator.materials.reflection_coefficients import over_angles
 
 STEP = 0.01
 """Step of the direction's component along the line, over 1, between which fields of the filter are
@@ -73,8 +74,8 @@ LOSS = 1e-3
 SPECTRUM_BINS = 256
 """Bins of a line's spectrum for Z. [-]"""
 
-ANGLES = 12
-"""Chebyshev points over the cosines of a link, for coefficients of a dielectric. [-]"""
+MOST_ALONG = 0.9999
+"""Most grazing component along a line that weights are worked out for: 0.8° over it. [-]"""
 
 Ways = tuple[Float[np.ndarray, " facets"], Float[np.ndarray, " facets"]]
 """Components of the directions to an antenna: along the line, and along its normal (> 0)."""
@@ -141,28 +142,29 @@ def _coefficient(
     vertical: bool,
     half_space: bool,
 ) -> Complex[np.ndarray, "nodes facets"]:
-    """Fresnel's coefficients of facets; a half space's are interpolated over the angle."""
+    """Fresnel's coefficients, interpolated between angles where those are many."""
+    of = replace(material, thickness=np.inf) if half_space else material
+    both = over_angles(of, frequencies, cosines)
+    return np.asarray(both.te if vertical else both.tm)
 
-    def exact(angles: Float[np.ndarray, " n"]) -> Complex[np.ndarray, "n nodes"]:
-        if half_space:
-            both = slab(material.permittivity(frequencies), np.inf, frequencies, angles)[0]
-        else:
-            both = reflection(material, frequencies, angles)
-        return both.te if vertical else both.tm
 
-    low, high = float(cosines.min()), float(cosines.max())
-    if half_space and len(cosines) > 4 * ANGLES:
-        angles = chebyshev_nodes(low, high, ANGLES)
-        basis = barycentric_basis(angles, cosines)
-        return np.asarray(np.einsum("af,an->nf", basis, exact(angles)))
-    return exact(cosines).T
+def reflection_of_front(
+    material: Material,
+    frequencies: Float[np.ndarray, " nodes"],
+    *,
+    polarization: Polarization,
+) -> Complex[np.ndarray, " nodes"]:
+    """Coefficient of a dielectric's front at normal incidence, without what its back returns. [-]."""
+    assert isinstance(material, Dielectric)
+    one = _coefficient(material, np.ones(1), frequencies, polarization == "vertical", True)
+    return np.asarray(one[:, 0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoughLine:
     """One run of facets, of one material, at the frequencies that its weights are sampled at.
 
-    Fields of the filter are worked out once for each direction of a grid, at all facets.
+    The weights of a transmitter are worked out once for each direction of a grid, at all facets.
     """
 
     heights: Float[np.ndarray, " facets"]  # [m]
@@ -171,65 +173,46 @@ class RoughLine:
     material: Material
     polarization: Polarization
     nodes: Float[np.ndarray, " nodes"]  # [Hz]
-    _fields: dict[int, Complex[np.ndarray, "parts nodes facets"]] = field(
-        default_factory=dict, repr=False
-    )
-    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def weights(
-        self,
-        transmit: Ways,
-        receive: Ways,
-        some: np.ndarray,
-        *,
-        side: Float[np.ndarray, " chosen"] | float = 1.0,
-        monostatic: bool,
-    ) -> Complex[np.ndarray, "#nodes chosen"]:
-        r"""Evaluate N of some of the line's facets.
+        self, transmit: Ways, receive: Ways, *, side: float, monostatic: bool
+    ) -> Complex[np.ndarray, "nodes facets"]:
+        r"""Evaluate N of all facets.
 
         Parameters
         ----------
         transmit, receive
-            Directions to both antennas, at these facets, on the side of the mean normal.
-        some
-            Indices of the facets on the line.
+            Directions to both antennas: at all facets, or one for all of them.
         side
             1 where the antennas are on the side that heights rise to, -1 on the other. [-]
         monostatic
-            Whether both are the same.
+            Whether both are the same. A slab's back is left out then: it changes the echo of all
+            facets alike, but for the angle.
         """
-        height = side * self.heights[some]
+        height = side * self.heights
         (t_i, q_i), (t_s, q_s) = transmit, receive
         total = q_i + q_s
-        how = {"polarization": self.polarization}
-        whole = kernels(self.material, transmit, receive, self.nodes, **how)
-        wavenumber = 2 * np.pi * self.nodes[:, None] / speed_of_light
-        thin = isinstance(self.material, Dielectric) and np.isfinite(self.material.thickness)
-        first = whole
-        if thin:
-            first = kernels(
-                self.material, transmit, receive, self.nodes, **how, half_space=True
-            )
+        pair = self.material, transmit, receive, self.nodes
+        first = kernels(*pair, polarization=self.polarization, half_space=True)
         weight = 2 * first.bragg / total
-        if thin:
-            weight = weight + 2 * (whole.mirror - first.mirror) / total
-            rest = whole.bragg - first.bragg - whole.mirror + first.mirror
-            weight = weight + 2j * wavenumber * rest * height
-        if isinstance(self.material, Dielectric) and self.polarization == "horizontal":
-            return np.asarray(weight)
-        sent = side * self._at(t_i, some)
-        heard = sent if monostatic else side * self._at(t_s, some)
-        if isinstance(self.material, Dielectric):
-            inner = self._inner(t_i) + self._inner(t_s)
-            local = inner - total
+        wavenumber = 2 * np.pi * self.nodes[:, None] / speed_of_light
+        dielectric = isinstance(self.material, Dielectric)
+        if isinstance(self.material, Dielectric) and not monostatic:
+            if np.isfinite(self.material.thickness):
+                whole = kernels(*pair, polarization=self.polarization)
+                rest = whole.bragg - first.bragg - whole.mirror + first.mirror
+                weight = weight + 2 * (whole.mirror - first.mirror) / total
+                weight = weight + 2j * wavenumber * rest * height
+        if dielectric and self.polarization == "horizontal":
+            return np.broadcast_to(weight, (self.nodes.size, self.heights.size))
+        sent = side * self._filtered(t_i)
+        heard = sent if monostatic else side * self._filtered(t_s)
+        if self.polarization == "horizontal":
+            again = _twice_scattered(sent, t_i, t_s) + _twice_scattered(heard, t_s, t_i)
+            filtered = (2 / total) * again - first.bragg * height
         else:
-            local = -total
-        if self.polarization == "vertical":
+            local = self._inner(t_i) + self._inner(t_s) - total if dielectric else -total
             filtered = first.bragg / total * (sent[0] + heard[0] + local * height)
-        else:
-            filtered = -first.bragg * height + (2 / total) * (
-                _twice_scattered(sent, t_i, t_s) + _twice_scattered(heard, t_s, t_i)
-            )
         return np.asarray(weight + 1j * wavenumber * filtered)
 
     def _inner(self, along: Float[np.ndarray, " chosen"]) -> Complex[np.ndarray, "nodes chosen"]:
@@ -238,24 +221,25 @@ class RoughLine:
         epsilon = self.material.permittivity(self.nodes)[:, None]
         return np.asarray(np.sqrt(epsilon - along**2))
 
-    def _at(
-        self, along: Float[np.ndarray, " chosen"], some: np.ndarray
-    ) -> Complex[np.ndarray, "parts nodes chosen"]:
-        """Interpolate the filter's fields for the directions of the facets. [m]."""
-        places = along / STEP
-        low, high = int(np.floor(places.min())), int(np.floor(places.max())) + 1
-        with self._lock:
-            for index in range(low, high + 1):
-                if index not in self._fields:
-                    self._fields[index] = self._field(index * STEP)
-        below = np.floor(places).astype(np.int64)
-        share = places - below
-        found = np.empty((*self._fields[low].shape[:2], some.size), dtype=np.complex128)
-        for index in range(low, high):
+    def _filtered(
+        self, along: Float[np.ndarray, " facets"]
+    ) -> Complex[np.ndarray, "parts nodes facets"]:
+        """Filter the heights, for the direction at each facet. [m]."""
+        if along.size == 1:
+            return self._field(float(along[0]))
+        below = np.floor(along / STEP).astype(np.int64)
+        found: Complex[np.ndarray, "parts nodes facets"] | None = None
+        last: tuple[int, np.ndarray] | None = None
+        for index in range(int(below.min()), int(below.max()) + 1):
             here = np.flatnonzero(below == index)
-            if here.size:
-                one, other = (self._fields[index + k][..., some[here]] for k in (0, 1))
-                found[..., here] = one + (other - one) * share[here]
+            one = last[1] if last and last[0] == index else self._field(index * STEP)
+            other = self._field((index + 1) * STEP)
+            last = index + 1, other
+            if found is None:
+                found = np.empty_like(one)
+            share = along[here] / STEP - index
+            found[..., here] = one[..., here] + (other - one)[..., here] * share
+        assert found is not None
         return found
 
     def _field(self, along: float) -> Complex[np.ndarray, "parts nodes facets"]:
@@ -294,6 +278,42 @@ class RoughLine:
             loss = np.sum(binned * (2 * np.pi * middle / speed_of_light) ** 2 / again, axis=-1)
             found.append(np.interp(row, grid, loss.real) + 1j * np.interp(row, grid, loss.imag))
         return np.array(found)
+
+
+class GridOfWeights:
+    """Weights of a rough line, for one transmitter, over the directions to the receivers."""
+
+    def __init__(self, line: RoughLine, transmit: Ways | None, side: float) -> None:
+        """Prepare; without a transmitter, each receiver transmits itself."""
+        self.line, self.transmit, self.side = line, transmit, side
+        self._half = math.ceil(1 / STEP)
+        shape = (2 * self._half + 1, line.heights.size, line.nodes.size)
+        self._known = np.zeros(shape[0], dtype=bool)
+        self._weights = np.zeros(shape, dtype=np.complex64)  # pages are taken when written
+        self._lock = threading.Lock()
+
+    def __call__(
+        self, along: Float[np.ndarray, " chosen"], some: Int[np.ndarray, " chosen"]
+    ) -> Complex[np.ndarray, "nodes chosen"]:
+        """Interpolate the weights of some facets, by the receiver's component along the line."""
+        places = along / STEP + self._half
+        below = np.clip(places.astype(np.int64), 0, 2 * self._half - 1)
+        with self._lock:
+            for index in range(int(below.min()), int(below.max()) + 2):
+                if not self._known[index]:
+                    self._weights[index] = self._at((index - self._half) * STEP).T
+                    self._known[index] = True
+        share = (places - below).astype(np.float32)[:, None]
+        one, other = self._weights[below, some], self._weights[below + 1, some]
+        return np.asarray((one + (other - one) * share).T)
+
+    def _at(self, along: float) -> Complex[np.ndarray, "nodes facets"]:
+        # Grazing along the line, the normal component of the last place of the grid is 0.
+        inside = np.clip(along, -MOST_ALONG, MOST_ALONG)
+        receive = np.array([inside]), np.array([np.sqrt(1 - inside**2)])
+        alone = self.transmit is None
+        sent = receive if self.transmit is None else self.transmit
+        return self.line.weights(sent, receive, side=self.side, monostatic=alone)
 
 
 def _twice_scattered(
