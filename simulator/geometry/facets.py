@@ -211,9 +211,7 @@ def joined(parts: Sequence[Facets]) -> Facets:
     runs: list[Run] = []
     corners: list[Edge] = []
     for start, part in zip(starts, parts, strict=False):
-        runs += (
-            replace(run, facets=run.facets + start, count=starts[-1]) for run in part.runs
-        )
+        runs += (replace(run, facets=run.facets + start, count=starts[-1]) for run in part.runs)
         corners += _renumbered(part.corners, facets=start, edges=len(corners))
     first = np.cumsum([0, *(len(part.materials) for part in parts)])
     indices = [

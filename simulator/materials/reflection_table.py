@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
+from scenes.schema.radio import Polarization
 from simulator.materials.layered_media import Conductor, Material, reflection
 
 TABLE_ACCURACY = 1e-5
@@ -45,9 +46,12 @@ class ReflectionTable:
 
 
 def reflection_table(
-    material: Material, frequencies: Float[np.ndarray, " freqs"]
+    material: Material,
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    polarization: Polarization = "vertical",
 ) -> ReflectionTable:
-    """Tabulate a material's coefficient for the field along z.
+    """Tabulate a material's coefficient.
 
     Parameters
     ----------
@@ -55,23 +59,31 @@ def reflection_table(
         What reflects.
     frequencies
         Any grid. [Hz]
+    polarization
+        The electric field is along z, or the magnetic one.
 
     Returns
     -------
     The table of fewest angles whose error is below :data:`TABLE_ACCURACY`; a single one for a
     conductor.
     """
+    vertical = polarization == "vertical"
+
+    def exact_at(some: Float[np.ndarray, " n"], cosines: Float[np.ndarray, " m"]) -> np.ndarray:
+        both = reflection(material, some, cosines)
+        return both.te if vertical else both.tm
+
     if isinstance(material, Conductor):
-        return ReflectionTable(samples=np.full((frequencies.size, 1), -1.0, np.complex64))
+        return ReflectionTable(
+            samples=np.full((frequencies.size, 1), -1.0 if vertical else 1.0, np.complex64)
+        )
     some = frequencies[:: max(1, frequencies.size // 8)]
     count = 64
     while count < MOST_ANGLES:
-        exact = reflection(material, some, np.linspace(0.0, 1.0, 2 * count + 1)).te
+        exact = exact_at(some, np.linspace(0.0, 1.0, 2 * count + 1))
         tried = (exact[:-1:2] + exact[2::2]) / 2
         if float(np.abs(tried - exact[1::2]).max()) <= TABLE_ACCURACY:
             break
         count *= 2
     cosines = np.linspace(0.0, 1.0, count + 1)
-    return ReflectionTable(
-        samples=reflection(material, frequencies, cosines).te.T.astype(np.complex64)
-    )
+    return ReflectionTable(samples=exact_at(frequencies, cosines).T.astype(np.complex64))

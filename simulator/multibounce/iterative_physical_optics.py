@@ -31,6 +31,7 @@ from estimator.compute.engine import thread_count
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
 from simulator.materials.reflection_table import reflection_table
+from simulator.multibounce.rough_faces import half_angle_cosines, rough_sources
 from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_planned
 
 COLUMNS_AT_ONCE = 1024
@@ -109,6 +110,7 @@ def quadrature(face: Face, count: int) -> Face:
     repeated = face.part(np.repeat(np.arange(face.count), count))
     return Face(
         centres=points.reshape(-1, 2),
+        places=repeated.places,
         normals=repeated.normals,
         sizes=(face.sizes[:, None] * weights / 2).ravel(),
         edges=repeated.edges,
@@ -116,6 +118,8 @@ def quadrature(face: Face, count: int) -> Face:
         surface=face.surface,
         side=face.side,
         material=face.material,
+        rough=repeated.rough,
+        polarization=face.polarization,
     )
 
 
@@ -223,13 +227,18 @@ def onward(
     strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
     # The mirror that would lead from the ports to the middle of what is seen of the target.
     towards = target.centres[seen.any(axis=0)].mean(axis=0) if seen.any() else wall.centres[0]
-    table = reflection_table(wall.material, nodes)
+    table = reflection_table(wall.material, nodes, polarization=wall.polarization)
     incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
     plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
     single = _SingleLinks.left_by(plan, wall, target)
     sizes, outward, inward = (
         values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
     )
+    aside = np.stack([-outward[:, 1], outward[:, 0]], axis=-1)
+    rough = None
+    if wall.rough.any() and seen.any():
+        centre = float(nodes[nodes.size // 2])
+        rough = rough_sources(wall, wave.bounds.origins, target.centres, seen, centre)
 
     def at_node(node: int) -> None:
         frequency = float(nodes[node])
@@ -237,11 +246,21 @@ def onward(
         reflected = table.at(incidence, node) * phasor(wave.middle * (-frequency / speed_of_light))
         reflected = reflected * sizes
         monopoles, dipoles = reflected * wave.slope[here], reflected * wave.strength[here]
+        across: np.ndarray | None = None
+        if rough is not None:
+            monopoles = np.where(wall.rough, dipoles * rough[0], monopoles)
+            across, dipoles = dipoles * rough[1], dipoles * rough[2]
         sources = np.stack([monopoles, dipoles * outward[:, 0], dipoles * outward[:, 1]])
+        if across is not None:
+            sources[1] += across * aside[:, 0]
+            sources[2] += across * aside[:, 1]
         field, from_x, from_y = sum_planned(plan, sources, columns, frequency)
         along_normal = inward[:, 0] * from_x + inward[:, 1] * from_y
         for some in single:
-            received = some.received(monopoles[:, some.rows], dipoles[:, some.rows], frequency)
+            sideways = None if across is None else across[:, some.rows]
+            received = some.received(
+                monopoles[:, some.rows], dipoles[:, some.rows], sideways, frequency
+            )
             field[:, some.columns] += received[0]
             along_normal[:, some.columns] += received[1]
         scale = math.sqrt(frequency / (4 * speed_of_light)) * np.exp(0.25j * np.pi)
@@ -266,6 +285,7 @@ class _SingleLinks:
     distance: Float[np.ndarray, "wall target"]  # [m]
     spreading: Float32[np.ndarray, "wall target"]  # 0 where hidden [m^-1/2]
     leaves: Float32[np.ndarray, "wall target"]  # cosine to the wall's normal
+    aside: Float32[np.ndarray, "wall target"] | None  # along it, if it is rough
     arrives: Float32[np.ndarray, "wall target"]  # cosine to the target's
 
     @classmethod
@@ -289,12 +309,17 @@ class _SingleLinks:
                 links = plan.left[np.ix_(rows, some)] / np.sqrt(distance)
                 leaves = np.einsum("wqx,wx->wq", direction, wall.normals[rows])
                 arrives = -np.einsum("wqx,qx->wq", direction, target.normals[some])
+                aside = None
+                if wall.rough.any():
+                    tangents = wall.normals[rows][:, ::-1] * np.array([-1.0, 1.0])
+                    aside = np.einsum("wqx,wx->wq", direction, tangents).astype(np.float32)
                 yield cls(
                     rows=rows,
                     columns=some,
                     distance=distance,
                     spreading=links.astype(np.float32),
                     leaves=leaves.astype(np.float32),
+                    aside=aside,
                     arrives=arrives.astype(np.float32),
                 )
 
@@ -302,6 +327,7 @@ class _SingleLinks:
         self,
         monopoles: Complex64[np.ndarray, "ports wall"],
         dipoles: Complex64[np.ndarray, "ports wall"],
+        across: Complex64[np.ndarray, "ports wall"] | None,
         frequency: float,
     ) -> tuple[Complex64[np.ndarray, "ports target"], Complex64[np.ndarray, "ports target"]]:
         """Sum the field, and the field times the cosine at the target."""
@@ -309,6 +335,10 @@ class _SingleLinks:
         turned = links * self.leaves
         strength = monopoles @ links + dipoles @ turned
         slope = monopoles @ (links * self.arrives) + dipoles @ (turned * self.arrives)
+        if across is not None and self.aside is not None:
+            turned = links * self.aside
+            strength += across @ turned
+            slope += across @ (turned * self.arrives)
         return strength, slope
 
 
@@ -320,22 +350,6 @@ class _Anew:
 
     def __iter__(self) -> "Iterator[_SingleLinks]":
         return self.make()
-
-
-def half_angle_cosines(
-    face: Face,
-    one: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
-    other: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
-) -> Float[np.ndarray, "ports facets"]:
-    """Cosines of half the angle at each facet between the ways to two points. [-]."""
-    both = unit(one - face.centres) + unit(other - face.centres)
-    return np.asarray(np.minimum(np.hypot(both[..., 0], both[..., 1]) / 2, 1.0))
-
-
-def unit(vectors: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-    """Return vectors of length 1 in the same directions."""
-    unit: np.ndarray = vectors / np.hypot(vectors[..., :1], vectors[..., 1:])
-    return unit
 
 
 def _groups(wall: Face) -> np.ndarray:

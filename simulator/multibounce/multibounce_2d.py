@@ -48,8 +48,8 @@ from simulator.multibounce.iterative_physical_optics import (
     onward,
     onward_bounds,
     quadrature,
-    unit,
 )
+from simulator.multibounce.rough_faces import rough_factor, unit
 
 WAVE_BYTES = 2**29
 """What the waves may take that are held at one time, at a block of a target's facets and, apart
@@ -435,7 +435,7 @@ def _linked(
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Link pairs of waves at a target, by reciprocity; the factors say how often each counts."""
     nodes, frequencies = total.nodes, total.frequencies
-    table = reflection_table(target.material, nodes)
+    table = reflection_table(target.material, nodes, polarization=target.polarization)
 
     def of_port(port: int) -> Complex[np.ndarray, " freqs"]:
         delays, amplitudes = [], []
@@ -445,12 +445,15 @@ def _linked(
             some = np.flatnonzero(lit[0])
             sent, received, face = one.part(some, port), other.part(some, port), target.part(some)
             ends = sent.bounds.origins, received.bounds.origins
-            towards = unit(ends[0] - face.centres) + unit(ends[1] - face.centres)
+            ways = unit(ends[0] - face.centres), unit(ends[1] - face.centres)
+            towards = ways[0] + ways[1]
             advance = np.einsum("pfx,fx->pf", towards, face.edges) / speed_of_light
             cosines = np.minimum(np.hypot(towards[..., 0], towards[..., 1]) / 2, 1.0)
             weight = face.sizes * np.sinc(nodes[:, None, None] * advance)
             weight = weight * (factor / (8 * np.pi))
             weight = weight * table.at(table.places(cosines), slice(None))
+            if face.rough.any():
+                weight = weight * rough_factor(face, *ways, float(nodes[nodes.size // 2]))
             if waves == "spherical":
                 lengths = sent.bounds.shortest + received.bounds.shortest
                 weight = weight / np.sqrt(lengths)

@@ -252,7 +252,9 @@ class _Part:
         """Obliquity times reflection of smooth facets, and what stands for it on rough lines."""
         smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
         obliquity = np.abs(inward.cosine[some[smooth]] + outward.cosine[some[smooth]])
-        flat = obliquity * self._coefficients(inward, outward, some[smooth], nodes, flat=facets.flat)
+        flat = obliquity * self._coefficients(
+            inward, outward, some[smooth], nodes, flat=facets.flat
+        )
         if smooth.size == some.size:
             return flat
         weights = np.empty((nodes.size, some.size), dtype=np.complex128)

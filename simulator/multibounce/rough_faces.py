@@ -1,0 +1,139 @@
+"""Rough faces in chains of surfaces: their weights, written as sources that chains can sum.
+
+Chains take the first order of :mod:`simulator.scattering.small_slope` only, at one frequency over
+the coefficient of the tangent plane there, and the ends of their facets without fringe currents.
+"""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Complex64, Float, Float32
+
+from simulator.geometry.faces import Face
+from simulator.scattering.small_slope import kernels
+
+LEAST_SPAN = 1e-3
+"""Least half angle between the directions that a rough wall's weights are met in. [rad]"""
+
+MOST_OBLIQUE = np.radians(89.0)
+"""Most oblique direction that they are worked out for. [rad]"""
+
+OUTLINE = 16
+"""Facets of a target that stand for the directions to it. [-]"""
+
+
+def rough_sources(
+    wall: Face,
+    origins: Float[np.ndarray, "ports wall 2"],
+    targets: Float[np.ndarray, "target 2"],
+    seen: Bool[np.ndarray, "wall target"],
+    frequency: float,
+) -> Float32[np.ndarray, "3 ports wall"] | Complex64[np.ndarray, "3 ports wall"]:
+    r"""Write a rough wall's weights as a monopole and a dipole at each facet.
+
+    The weight :math:`2B/QR` (:mod:`simulator.scattering.small_slope`, first order) takes the place
+    of :math:`\cos\theta_{in} + \cos\theta_{out}`. It is met in three directions that span what the
+    wall sees of the target, by :math:`a + b\,\hat u\cdot\hat t + c\,\hat u\cdot\hat n`: between
+    them it errs by the third power of the angle they span.
+
+    Parameters
+    ----------
+    wall
+        The face, some of it rough.
+    origins
+        Where the wave comes from. [m]
+    targets, seen
+        Facets that it goes to, and which facets of the wall see them.
+    frequency
+        A dielectric's kernels are taken at this one, over its coefficient there. [Hz]
+
+    Returns
+    -------
+    a, b and c; 0, 0 and 1 where the wall is smooth. [-]
+    """
+    normal = wall.normals
+    tangent = normal[:, ::-1] * np.array([-1.0, 1.0])
+    met = targets[seen.any(axis=0)]
+    middle = met.mean(axis=0)
+    met = met[np.linspace(0, len(met) - 1, min(len(met), OUTLINE)).round().astype(np.int64)]
+    ways = unit(met[:, None] - wall.centres)  # [met, wall, 2]
+    along, upright = np.einsum("mwx,wx->mw", ways, tangent), np.einsum("mwx,wx->mw", ways, normal)
+    angle = np.arctan2(along, upright)
+    low, high = angle.min(axis=0), angle.max(axis=0)
+    margin = np.maximum((high - low) / 2, LEAST_SPAN)
+    centre = np.clip((low + high) / 2, -MOST_OBLIQUE, MOST_OBLIQUE)
+    arriving = unit(origins - wall.centres)
+    sent = _ways(arriving, tangent, normal)
+    flat = half_angle_cosines(wall, origins, middle)
+    at = np.array([frequency])
+    how: dict[str, Any] = {"polarization": wall.polarization, "half_space": True}
+    shape = sent[0].shape
+    columns, values = [], []
+    for share in (-1.0, 0.0, 1.0):
+        out = np.clip(centre + share * margin, -MOST_OBLIQUE, MOST_OBLIQUE + LEAST_SPAN)
+        receive = np.broadcast_to(np.sin(out), shape), np.broadcast_to(np.cos(out), shape)
+        columns.append(np.stack([np.ones_like(out), np.sin(out), np.cos(out)], axis=-1))
+        pair = [(t.ravel(), q.ravel()) for t, q in (sent, receive)]
+        bragg = kernels(wall.material, pair[0], pair[1], at, **how).bragg.reshape(shape)
+        values.append(2 * bragg / (sent[1] + receive[1]))
+    # Of the mirror that the table's coefficient is taken at.
+    ones = flat.ravel()
+    sides = np.sqrt(1 - ones**2), ones
+    mirrored = kernels(wall.material, (-sides[0], ones), (sides[0], ones), at, **how).mirror
+    coefficient = mirrored.reshape(shape) / (2 * flat**2)
+    matrix = np.stack(columns, axis=1)  # [wall, 3, 3]
+    wanted = np.moveaxis(np.stack(values) / coefficient, 0, -1)  # [ports, wall, 3]
+    found = np.moveaxis(np.linalg.solve(matrix, wanted[..., None])[..., 0], -1, 0)
+    plain = np.array([0.0, 0.0, 1.0])[:, None, None]
+    return np.where(wall.rough, found, plain).astype(np.complex64)
+
+
+def rough_factor(
+    face: Face,
+    one: Float[np.ndarray, "ports facets 2"],
+    other: Float[np.ndarray, "ports facets 2"],
+    frequency: float,
+) -> Complex64[np.ndarray, "ports facets"]:
+    """Weights of a rough target, over those of its tangent planes, between two directions. [-]."""
+    tangent = face.normals[:, ::-1] * np.array([-1.0, 1.0])
+    sent, heard = (_ways(way, tangent, face.normals) for way in (one, other))
+    pair = [(t.ravel(), q.ravel()) for t, q in (sent, heard)]
+    both = kernels(
+        face.material,
+        pair[0],
+        pair[1],
+        np.array([frequency]),
+        polarization=face.polarization,
+        half_space=True,
+    )
+    square = (sent[1] + heard[1]).ravel() ** 2
+    along = (sent[0] + heard[0]).ravel() ** 2
+    factor = both.bragg[0] / both.mirror[0] * (square + along) / square
+    return np.where(face.rough, factor.reshape(sent[0].shape), 1.0).astype(np.complex64)
+
+
+def _ways(
+    directions: Float[np.ndarray, "ports facets 2"],
+    tangent: Float[np.ndarray, "facets 2"],
+    normal: Float[np.ndarray, "facets 2"],
+) -> tuple[Float[np.ndarray, "ports facets"], Float[np.ndarray, "ports facets"]]:
+    """Components along and off a mean surface, no closer to grazing than is asked for."""
+    along = np.einsum("pfx,fx->pf", directions, tangent)
+    upright = np.einsum("pfx,fx->pf", directions, normal)
+    return along, np.maximum(upright, np.cos(MOST_OBLIQUE))
+
+
+def half_angle_cosines(
+    face: Face,
+    one: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
+    other: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
+) -> Float[np.ndarray, "ports facets"]:
+    """Cosines of half the angle at each facet between the ways to two points. [-]."""
+    both = unit(one - face.centres) + unit(other - face.centres)
+    return np.asarray(np.minimum(np.hypot(both[..., 0], both[..., 1]) / 2, 1.0))
+
+
+def unit(vectors: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+    """Return vectors of length 1 in the same directions."""
+    unit: np.ndarray = vectors / np.hypot(vectors[..., :1], vectors[..., 1:])
+    return unit
