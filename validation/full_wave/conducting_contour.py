@@ -47,6 +47,7 @@ class Contour:
     curvatures: Float[np.ndarray, " points"]  # positive if convex seen along the normal [1/m]
     step: float  # h, of the parameter [rad]
     closed: bool
+    schwarzian: Float[np.ndarray, " points"] | None = None  # of the arc over the parameter [-]
 
     @property
     def count(self) -> int:
@@ -82,40 +83,85 @@ def open_strip(profile: Float[np.ndarray, "vertices axis"], *, spacing: float) -
     ValueError
         If points are missing or coincide, or the spacing is not positive.
     """
-    chords = np.hypot(*np.diff(profile[:, :2], axis=0).T)
-    if len(profile) < 4 or not np.all(chords > 0):
-        raise ValueError(
-            f"a strip through {len(profile)} points, the shortest step "
-            f"{chords.min(initial=np.inf):g} m: at least four points that differ are needed"
-        )
     _check_spacing(spacing)
-    ends = np.concatenate([[0.0], np.cumsum(chords)])
-    curve = CubicSpline(ends, profile[:, :2])
-    slope = curve.derivative()
-    fine = np.interp(np.arange(FINER * (len(ends) - 1) + 1) / FINER, np.arange(len(ends)), ends)
-    length = CubicSpline(fine, np.hypot(*slope(fine).T)).antiderivative()(fine)
-    parameter = CubicSpline(length, fine)
-    total = float(length[-1])
+    arc = SplineArc(profile)
     # The middle is sampled by L/(N − 2·EDGE_DIGITS/π): the rest is spent on the edges.
-    count = int(np.ceil(total / spacing + 2 * EDGE_DIGITS / np.pi))
+    count = int(np.ceil(arc.length / spacing + 2 * EDGE_DIGITS / np.pi))
     alpha = 1 / np.cosh(EDGE_DIGITS / count)
     step = np.pi / count
     # From the first vertex to the last: cos θ falls, so θ runs from π to 0.
     angle = np.pi - step * (np.arange(count) + 0.5)
     place = np.arcsin(alpha * np.cos(angle)) / np.arcsin(alpha)
     rate = alpha * np.sin(angle) / np.sqrt(1 - (alpha * np.cos(angle)) ** 2) / np.arcsin(alpha)
-    along = 0.5 * total * (1 + place)
-    where = parameter(along)
-    tangent, bend = slope(where), curve.derivative(2)(where)
-    pace = np.hypot(*tangent.T)
+    points, normals, curvatures, pace = arc.sampled(0.5 * arc.length * (1 + place))
     return Contour(
-        points=np.asarray(curve(where)),
-        normals=np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) / pace[:, None],
-        speeds=np.asarray(0.5 * total * rate * pace * parameter(along, 1)),
-        curvatures=_curvature(tangent, bend),
+        points=points,
+        normals=normals,
+        speeds=np.asarray(0.5 * arc.length * rate * pace),
+        curvatures=curvatures,
         step=step,
         closed=False,
+        schwarzian=_schwarzian(angle, alpha),
     )
+
+
+class SplineArc:
+    """The cubic spline through the points of a profile, over its own arc length.
+
+    Parameters
+    ----------
+    profile
+        At least four points from end to end; a third coordinate is left out. [m]
+
+    Raises
+    ------
+    ValueError
+        If points are missing or coincide.
+    """
+
+    def __init__(self, profile: Float[np.ndarray, "vertices axis"]) -> None:
+        chords = np.hypot(*np.diff(profile[:, :2], axis=0).T)
+        if len(profile) < 4 or not np.all(chords > 0):
+            raise ValueError(
+                f"a strip through {len(profile)} points, the shortest step "
+                f"{chords.min(initial=np.inf):g} m: at least four points that differ are needed"
+            )
+        ends = np.concatenate([[0.0], np.cumsum(chords)])
+        self._curve = CubicSpline(ends, profile[:, :2])
+        self._slope = self._curve.derivative()
+        inner = np.arange(FINER * (len(ends) - 1) + 1) / FINER
+        fine = np.interp(inner, np.arange(len(ends)), ends)
+        length = CubicSpline(fine, np.hypot(*self._slope(fine).T)).antiderivative()(fine)
+        self._parameter = CubicSpline(length, fine)
+        self.length = float(length[-1])  # [m]
+
+    def sampled(
+        self, along: Float[np.ndarray, " n"]
+    ) -> tuple[
+        Float[np.ndarray, "n 2"],
+        Float[np.ndarray, "n 2"],
+        Float[np.ndarray, " n"],
+        Float[np.ndarray, " n"],
+    ]:
+        """Return points [m], normals, curvatures [1/m], and arc length per unit of ``along``."""
+        where = self._parameter(along)
+        tangent, bend = self._slope(where), self._curve.derivative(2)(where)
+        pace = np.hypot(*tangent.T)
+        return (
+            np.asarray(self._curve(where)),
+            np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) / pace[:, None],
+            _curvature(tangent, bend),
+            np.asarray(pace * self._parameter(along, 1)),
+        )
+
+
+def _schwarzian(angle: Float[np.ndarray, " n"], alpha: float) -> Float[np.ndarray, " n"]:
+    r"""Return :math:`g' - g^2/2` with :math:`g = s''/s'` of the strip's map. [-]."""
+    sine, cosine = np.sin(angle), np.cos(angle)
+    rest = 1 - (alpha * cosine) ** 2
+    growth = cosine / sine - alpha**2 * sine * cosine / rest
+    bend = (cosine**2 - sine**2) / rest - 2 * (alpha * sine * cosine / rest) ** 2
+    return np.asarray(-1 / sine**2 - alpha**2 * bend - 0.5 * growth**2)
 
 
 def closed_contour(

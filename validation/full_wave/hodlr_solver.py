@@ -1,14 +1,14 @@
-r"""Direct solver for symmetric matrices whose off-diagonal blocks have low rank (HODLR).
+r"""Direct solver for matrices whose off-diagonal blocks have low rank (HODLR).
 
 Points in the order of a curve are halved again and again. Halves A and B of the same parent
-interact by :math:`U_{AB} V_{AB}^T` of low rank, since waves between distant parts of a curve
-have few degrees of freedom. Solving is exact then, by the Woodbury formula from the leaves
-up [1]_:
+interact by :math:`U V^T` and :math:`W Z^T` of low rank, since waves between distant parts of a
+curve have few degrees of freedom; in a symmetric matrix :math:`W = V`, :math:`Z = U`. Solving is
+exact then, by the Woodbury formula from the leaves up [1]_:
 
-.. math:: \begin{pmatrix} A & U V^T \\ V U^T & B \end{pmatrix}
+.. math:: \begin{pmatrix} A & U V^T \\ W Z^T & B \end{pmatrix}
           \begin{pmatrix} x \\ y \end{pmatrix} = \begin{pmatrix} f \\ g \end{pmatrix}
 
-    (1 - U^T A^{-1} U\, V^T B^{-1} V)\, U^T x = U^T A^{-1} f - U^T A^{-1} U\, V^T B^{-1} g
+    (1 - Z^T A^{-1} U\, V^T B^{-1} W)\, Z^T x = Z^T A^{-1} f - Z^T A^{-1} U\, V^T B^{-1} g
 
 Blocks are never formed. Their rank is read off a sample of their rows and columns, dense next
 to the point where the halves meet and ever sparser away from it, and a block is interpolated
@@ -44,31 +44,54 @@ NEAR = 40
 PER_OCTAVE = 12
 """Samples for each doubling of the distance from there. [-]"""
 
+MOST_FILLED = 0.6
+"""Rank over the sample's size up to which the sample is taken to show all of it. [-]"""
+
 TOLERANCE = 1e-8
 """Where the sample's pivoted QR decomposition is cut, over its first pivot. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
+class Link:
+    """Two halves' blocks of low rank: the upper right and the lower left one."""
+
+    left: Complex[np.ndarray, "first rank"]  # U
+    right: Complex[np.ndarray, "second rank"]  # V
+    lower_left: Complex[np.ndarray, "second back"]  # W
+    lower_right: Complex[np.ndarray, "first back"]  # Z
+
+    @property
+    def rank(self) -> int:
+        """The larger of both blocks' ranks."""
+        return max(self.left.shape[1], self.lower_left.shape[1])
+
+
+@dataclass(frozen=True, kw_only=True)
 class HierarchicalMatrix:
-    """A symmetric matrix of low-rank off-diagonal blocks: a leaf, or two halves and their link."""
+    """A matrix of low-rank off-diagonal blocks: a leaf, or two halves and their link."""
 
     whole: Complex[np.ndarray, "n n"] | None = None  # of a leaf
     halves: "tuple[HierarchicalMatrix, HierarchicalMatrix] | None" = None
-    left: Complex[np.ndarray, "first rank"] | None = None
-    right: Complex[np.ndarray, "second rank"] | None = None
+    link: Link | None = None
 
     @property
     def largest_rank(self) -> int:
         """Largest rank of a link."""
-        if self.halves is None or self.left is None:
+        if self.halves is None or self.link is None:
             return 0
-        return max(int(self.left.shape[1]), *(half.largest_rank for half in self.halves))
+        return max(self.link.rank, *(half.largest_rank for half in self.halves))
 
 
 def compress(
-    entries: Entries, first: int, last: int, *, leaf: int = LEAF, tolerance: float = TOLERANCE
+    entries: Entries,
+    first: int,
+    last: int,
+    *,
+    leaf: int = LEAF,
+    tolerance: float = TOLERANCE,
+    symmetric: bool = True,
 ) -> HierarchicalMatrix:
-    """Compress the part of a symmetric matrix between two indices.
+    """Compress the part of a matrix between two indices.
 
     Parameters
     ----------
@@ -80,19 +103,28 @@ def compress(
         Most points of a block that is kept whole.
     tolerance
         Where ranks are cut. [-]
+    symmetric
+        Whether the lower left blocks are the upper right ones' transposes.
     """
     if last - first <= leaf:
         every = np.arange(first, last)
         return HierarchicalMatrix(whole=entries(every, every))
     middle = (first + last) // 2
     left, right = _link(entries, first, middle, last, tolerance)
+    lower_left, lower_right = right, left
+    if not symmetric:
+        # The transpose's upper right block is this one's lower left.
+        lower_right, lower_left = _link(
+            lambda rows, columns: entries(columns, rows).T, first, middle, last, tolerance
+        )
+    ends = ((first, middle), (middle, last))
+    upper, lower = (
+        compress(entries, *part, leaf=leaf, tolerance=tolerance, symmetric=symmetric)
+        for part in ends
+    )
     return HierarchicalMatrix(
-        halves=(
-            compress(entries, first, middle, leaf=leaf, tolerance=tolerance),
-            compress(entries, middle, last, leaf=leaf, tolerance=tolerance),
-        ),
-        left=left,
-        right=right,
+        halves=(upper, lower),
+        link=Link(left=left, right=right, lower_left=lower_left, lower_right=lower_right),
     )
 
 
@@ -100,18 +132,18 @@ def solve(
     matrix: HierarchicalMatrix, sides: Complex[np.ndarray, "n sides"]
 ) -> Complex[np.ndarray, "n sides"]:
     """Solve for several right-hand sides."""
-    if matrix.halves is None or matrix.left is None or matrix.right is None:
+    if matrix.halves is None or matrix.link is None:
         assert matrix.whole is not None
         factors = lu_factor(matrix.whole, check_finite=False)
         return np.asarray(lu_solve(factors, sides, check_finite=False))
-    split, count = len(matrix.left), sides.shape[1]
+    link = matrix.link
+    split, count = len(link.left), sides.shape[1]
     # The links of this level are more right-hand sides of the halves: all goes up in one sweep.
-    upper = solve(matrix.halves[0], np.concatenate([sides[:split], matrix.left], axis=1))
-    lower = solve(matrix.halves[1], np.concatenate([sides[split:], matrix.right], axis=1))
-    above, below = matrix.left.T @ upper, matrix.right.T @ lower
-    rank = matrix.left.shape[1]
-    coupling = np.eye(rank) - above[:, count:] @ below[:, count:]
-    # U^T x, and V^T y from it.
+    upper = solve(matrix.halves[0], np.concatenate([sides[:split], link.left], axis=1))
+    lower = solve(matrix.halves[1], np.concatenate([sides[split:], link.lower_left], axis=1))
+    above, below = link.lower_right.T @ upper, link.right.T @ lower
+    coupling = np.eye(len(above)) - above[:, count:] @ below[:, count:]
+    # Z^T x, and V^T y from it.
     seen = np.linalg.solve(coupling, above[:, :count] - above[:, count:] @ below[:, :count])
     answered = below[:, :count] - below[:, count:] @ seen
     return np.concatenate(
@@ -148,10 +180,17 @@ def chosen_columns(
 def _link(
     entries: Entries, first: int, middle: int, last: int, tolerance: float
 ) -> tuple[Complex[np.ndarray, "first rank"], Complex[np.ndarray, "second rank"]]:
-    above = middle - 1 - _sampled(middle - first)
-    below = middle + _sampled(last - middle)
-    sample = entries(above, below)
-    columns, _ = chosen_columns(sample, tolerance)
+    near, per_octave = NEAR, PER_OCTAVE
+    while True:
+        above = middle - 1 - _sampled(middle - first, near, per_octave)
+        below = middle + _sampled(last - middle, near, per_octave)
+        sample = entries(above, below)
+        columns, _ = chosen_columns(sample, tolerance)
+        whole = len(above) == middle - first and len(below) == last - middle
+        # A sample that is all but full rank says nothing of the block: take a denser one.
+        if whole or len(columns) < MOST_FILLED * min(sample.shape):
+            break
+        near, per_octave = 2 * near, 2 * per_octave
     rows, _ = chosen_columns(sample[:, columns].T, 0.0)
     cross = sample[np.ix_(rows, columns)]
     left = entries(np.arange(first, middle), below[columns])
@@ -159,11 +198,11 @@ def _link(
     return np.linalg.solve(cross.T, left.T).T, right.T
 
 
-def _sampled(count: int) -> Int[np.ndarray, " sampled"]:
+def _sampled(count: int, near: int, per_octave: int) -> Int[np.ndarray, " sampled"]:
     """Choose distances 0 … count − 1 from the meeting point."""
-    if count <= 2 * NEAR:
+    if count <= 2 * near:
         return np.arange(count)
-    octaves = np.log2(count / NEAR)
-    spread = NEAR * 2.0 ** np.linspace(0, octaves, int(np.ceil(PER_OCTAVE * octaves)))
+    octaves = np.log2(count / near)
+    spread = near * 2.0 ** np.linspace(0, octaves, int(np.ceil(per_octave * octaves)))
     far = np.minimum(spread.astype(np.int64), count - 1)
-    return np.unique(np.concatenate([np.arange(NEAR), far]))
+    return np.unique(np.concatenate([np.arange(near), far]))

@@ -1,0 +1,113 @@
+r"""Closed contours with corners, on grids that are graded towards them.
+
+A side from corner to corner has points at half steps :math:`\tau = \tfrac12, \tfrac32, \dots` of a
+parameter with
+
+.. math:: \frac{ds}{d\tau} = \Delta\, I_{\tau/M}(p, p)
+
+at either end, :math:`I` the regularised incomplete beta function, which rises from 0 to 1 over M
+points as :math:`\tau^p`, and evenly spaced points between. What grows as a power of the distance
+from a corner is, per step, a smooth function of :math:`\tau` across it [1]_, up to an order that
+grows with p.
+
+References
+----------
+.. [1] R. Kress, "A Nyström method for boundary integral equations in domains with corners",
+   Numer. Math. 58, 1990.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import betainc
+
+from validation.full_wave.conducting_contour import Contour, SplineArc
+
+ORDER, RISE = 4, 20
+"""p, and M: the points over which the spacing rises from a corner. [-]"""
+
+CLOSE = 1e-9
+"""How far the end of a side may be from the start of the next, over its length. [-]"""
+
+
+def cornered_contour(
+    sides: Sequence[Float[np.ndarray, "vertices 2"]], spacings: Sequence[float]
+) -> Contour:
+    """Sample a closed contour with a corner between every two sides.
+
+    Parameters
+    ----------
+    sides
+        Points of each, counter-clockwise, from corner to corner; two for a straight one, at least
+        four for a curve (a cubic spline). [m]
+    spacings
+        Arc length between the points of each side, at most. [m]
+
+    Raises
+    ------
+    ValueError
+        If the sides do not close, run clockwise, or a spacing is not positive.
+    """
+    for index, side in enumerate(sides):
+        gap = float(np.hypot(*(sides[(index + 1) % len(sides)][0] - side[-1])))
+        if gap > CLOSE * float(np.hypot(*np.ptp(side, axis=0))):
+            raise ValueError(
+                f"side {index} ends {gap:g} m from where the next one starts; a contour must close"
+            )
+        if not spacings[index] > 0:
+            raise ValueError(f"spacing = {spacings[index]} m must be positive; give a length")
+    outline = np.concatenate([side[:-1] for side in sides])
+    after = np.roll(outline, -1, axis=0)
+    if not np.sum(outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0]) > 0:
+        raise ValueError("the sides run clockwise; turn them, so that their normals look out")
+    parts = [_side(side, spacing) for side, spacing in zip(sides, spacings, strict=True)]
+    points, normals, curvatures, speeds = (np.concatenate(one) for one in zip(*parts, strict=True))
+    return Contour(
+        points=points,
+        normals=normals,
+        speeds=speeds,
+        curvatures=curvatures,
+        step=1.0,
+        closed=True,
+    )
+
+
+def box(
+    centre: Float[np.ndarray, " 2"], size: tuple[float, float], angle: float, *, spacing: float
+) -> Contour:
+    """Sample a rectangle, turned by an angle in rad; lengths in m."""
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    corners = centre + 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size @ axes
+    sides = [np.stack([corners[one], corners[(one + 1) % 4]]) for one in range(4)]
+    return cornered_contour(sides, [spacing] * 4)
+
+
+def _side(
+    side: Float[np.ndarray, "vertices 2"], spacing: float
+) -> tuple[
+    Float[np.ndarray, "n 2"],
+    Float[np.ndarray, "n 2"],
+    Float[np.ndarray, " n"],
+    Float[np.ndarray, " n"],
+]:
+    if len(side) == 2:
+        side = side[0] + np.linspace(0, 1, 4)[:, None] * (side[1] - side[0])
+    arc = SplineArc(side)
+    # The rise at either end takes half its points' arc.
+    count = max(int(np.ceil(arc.length / spacing)) + RISE, 2 * RISE)
+    step = arc.length / (count - RISE)
+    index = np.arange(count) + 0.5
+    first, last = np.minimum(index / RISE, 1.0), np.minimum((count - index) / RISE, 1.0)
+    rate = betainc(ORDER, ORDER, first) * betainc(ORDER, ORDER, last)
+    along = _risen(index) * step
+    along = np.where(index > 0.5 * count, arc.length - _risen(count - index) * step, along)
+    points, normals, curvatures, pace = arc.sampled(along)
+    return points, normals, curvatures, np.asarray(step * rate * pace)
+
+
+def _risen(index: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    r"""Integrate the rise from a corner, :math:`\int_0^x I_t = x I_x(p, p) - I_x(p + 1, p)/2`."""
+    part = np.minimum(index / RISE, 1.0)
+    rising = RISE * (part * betainc(ORDER, ORDER, part) - 0.5 * betainc(ORDER + 1, ORDER, part))
+    return np.asarray(rising + np.maximum(index - RISE, 0.0))
