@@ -90,6 +90,7 @@ def compress(
     leaf: int = LEAF,
     tolerance: float = TOLERANCE,
     symmetric: bool = True,
+    sampling: tuple[int, int] = (NEAR, PER_OCTAVE),
 ) -> HierarchicalMatrix:
     """Compress the part of a matrix between two indices.
 
@@ -105,21 +106,30 @@ def compress(
         Where ranks are cut. [-]
     symmetric
         Whether the lower left blocks are the upper right ones' transposes.
+    sampling
+        In place of :data:`NEAR` and :data:`PER_OCTAVE`. [-]
     """
     if last - first <= leaf:
         every = np.arange(first, last)
         return HierarchicalMatrix(whole=entries(every, every))
     middle = (first + last) // 2
-    left, right = _link(entries, first, middle, last, tolerance)
+    left, right = _link(entries, first, middle, last, tolerance, sampling)
     lower_left, lower_right = right, left
     if not symmetric:
         # The transpose's upper right block is this one's lower left.
         lower_right, lower_left = _link(
-            lambda rows, columns: entries(columns, rows).T, first, middle, last, tolerance
+            lambda rows, columns: entries(columns, rows).T,
+            first,
+            middle,
+            last,
+            tolerance,
+            sampling,
         )
     ends = ((first, middle), (middle, last))
     upper, lower = (
-        compress(entries, *part, leaf=leaf, tolerance=tolerance, symmetric=symmetric)
+        compress(
+            entries, *part, leaf=leaf, tolerance=tolerance, symmetric=symmetric, sampling=sampling
+        )
         for part in ends
     )
     return HierarchicalMatrix(
@@ -178,9 +188,14 @@ def chosen_columns(
 
 
 def _link(
-    entries: Entries, first: int, middle: int, last: int, tolerance: float
+    entries: Entries,
+    first: int,
+    middle: int,
+    last: int,
+    tolerance: float,
+    sampling: tuple[int, int],
 ) -> tuple[Complex[np.ndarray, "first rank"], Complex[np.ndarray, "second rank"]]:
-    near, per_octave = NEAR, PER_OCTAVE
+    near, per_octave = sampling
     while True:
         above = middle - 1 - _sampled(middle - first, near, per_octave)
         below = middle + _sampled(last - middle, near, per_octave)

@@ -1,0 +1,121 @@
+r"""Scattered fields of a two-dimensional scene at one frequency, by a direct solver.
+
+Sources and receivers far from the bodies light them in far fewer ways than there are places: some
+places are chosen and solved for, all others are interpolated from them. With the right-hand sides
+:math:`B_J` and what is heard :math:`H_J` of the chosen places, and the interpolation :math:`T`,
+
+.. math:: u_{sr} = t_s^T (B_J^T A^{-T} H_J)\, t_r
+
+Each solution is put back into a few rows of the equations.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Int
+
+from validation.full_wave.boundary_equations import BoundaryProblem
+from validation.hierarchical_solver import chosen_columns, compress, solve
+from validation.line_source import LineSource
+
+TOLERANCE = 1e-7
+"""Where ranks are cut; fields then err by some 1e-6. [-]"""
+
+LEAF = 160
+"""Most unknowns of a block that is kept whole. [-]"""
+
+SAMPLINGS = ((160, 96), (480, 288))
+"""Unknowns next to a cut that are sampled, and for each doubling of the distance from it; where
+the first leaves a residual, the next is tried. [-]"""
+
+CHECKED, MOST_RESIDUAL = 200, 1e-4
+"""Rows that a solution is put into, and how far it may be off there, over the incident
+field. [-]"""
+
+THINNED = 64
+"""Rows by which the places are chosen, besides twice as many as there are places. [-]"""
+
+
+class FullWaveError(RuntimeError):
+    """A solution does not satisfy its equation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lit:
+    """Places in the scene, chosen ones and how the others follow from these."""
+
+    chosen: Int[np.ndarray, " rank"]
+    spread: Complex[np.ndarray, "rank places"]
+
+
+def link_fields(
+    problem: BoundaryProblem, sources: Sequence[LineSource], receivers: Sequence[LineSource]
+) -> Complex[np.ndarray, "sources receivers"]:
+    """Solve for the scattered field of each source at each receiver.
+
+    Parameters
+    ----------
+    problem
+        The scene.
+    sources, receivers
+        Outside of the bodies.
+
+    Raises
+    ------
+    FullWaveError
+        If the solution does not satisfy the equation.
+    """
+    sent, heard = _lit(problem, sources), _lit(problem, receivers)
+    between = _between(problem, _some(sources, sent), _some(receivers, heard))
+    return np.asarray(sent.spread.T @ between @ heard.spread)
+
+
+def echo_fields(
+    problem: BoundaryProblem, places: Sequence[LineSource]
+) -> Complex[np.ndarray, " places"]:
+    """Solve for the scattered field of each source at its own place; see :func:`link_fields`."""
+    lit = _lit(problem, places)
+    some = _some(places, lit)
+    between = _between(problem, some, some)
+    return np.asarray(np.einsum("rp,rs,sp->p", lit.spread, between, lit.spread, optimize=True))
+
+
+def _some(ends: Sequence[LineSource], lit: Lit) -> list[LineSource]:
+    return [ends[index] for index in lit.chosen]
+
+
+def _lit(problem: BoundaryProblem, ends: Sequence[LineSource]) -> Lit:
+    count = min(problem.size, 2 * len(ends) + THINNED)
+    rows = np.unique(np.linspace(0, problem.size - 1, count).astype(np.int64))
+    sample = np.concatenate([problem.sides(ends, rows), problem.heard(ends, rows)])
+    chosen, spread = chosen_columns(sample, TOLERANCE)
+    return Lit(chosen=chosen, spread=spread)
+
+
+def _between(
+    problem: BoundaryProblem, sources: Sequence[LineSource], receivers: Sequence[LineSource]
+) -> Complex[np.ndarray, "sources receivers"]:
+    sides = problem.sides(sources)
+    checked = np.unique(np.linspace(0, problem.size - 1, CHECKED).astype(np.int64))
+    rows = problem.entries(checked, np.arange(problem.size))
+    for sampling in SAMPLINGS:
+        matrix = compress(
+            problem.entries,
+            0,
+            problem.size,
+            leaf=LEAF,
+            tolerance=TOLERANCE,
+            symmetric=False,
+            sampling=sampling,
+        )
+        solution = solve(matrix, sides)
+        left = rows @ solution - sides[checked]
+        worst = float((np.linalg.norm(left, axis=0) / np.linalg.norm(sides[checked], axis=0)).max())
+        if worst < MOST_RESIDUAL:
+            return np.asarray(solution.T @ problem.heard(receivers))
+    raise FullWaveError(
+        f"at a wavelength of {2e3 * np.pi / problem.wavenumber:.6g} mm the solution errs by "
+        f"{worst:.1e} of the incident field, more than {MOST_RESIDUAL:g}; does a contour cross "
+        "itself or touch another?"
+    )
