@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Complex, Int
 
 from validation.full_wave.boundary_equations import BoundaryProblem
-from validation.hierarchical_solver import chosen_columns, compress, solve
-from validation.line_source import LineSource
+from validation.full_wave.hodlr_solver import chosen_columns, compress, solve
+from validation.full_wave.line_source import LineSource
 
 TOLERANCE = 1e-7
 """Where ranks are cut; fields then err by some 1e-6. [-]"""
