@@ -25,8 +25,9 @@ cancel:
 .. math:: f_e - \tfrac1\rho (D_i u + \rho k S_i q) - \tfrac12 (1 + \tfrac1\rho) u &= -u_i \\
           g_e - (N_i u + \rho k K'_i q)/k + \tfrac12 (1 + \rho) q &= -\partial_n u_i / k
 
-Rows and unknowns are weighted by the square root of the arc length. They are ordered along the
-scene's longest direction, so that a cut between them is a cross-section of the bodies.
+Rows and unknowns are weighted by the square root of the arc length, on TE conductors by the arc
+length, over its largest step, where N would grow without bound towards a corner. They are ordered
+along the scene's longest direction, so that a cut between them is a cross-section of the bodies.
 
 References
 ----------
@@ -35,12 +36,12 @@ References
    equations", Wave Motion 5, 1983.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Int
 
 from validation.full_wave.conducting_contour import Contour
 from validation.full_wave.layer_potentials import Block, CurveOperators
@@ -93,9 +94,7 @@ class BoundaryProblem:
         owner = np.repeat(np.arange(len(bodies)), [part.size for part in self._parts])
         point = np.concatenate([part.points for part in self._parts])
         component = np.concatenate([part.components for part in self._parts])
-        places = np.concatenate(
-            [part.body.contour.points[part.points] for part in self._parts]
-        )
+        places = np.concatenate([part.body.contour.points[part.points] for part in self._parts])
         spread = places - places.mean(axis=0)
         axis = np.linalg.eigh(spread.T @ spread)[1][:, -1]
         # Ties keep the components of a point together.
@@ -132,7 +131,12 @@ class BoundaryProblem:
         """Evaluate what each receiver hears of the unknowns; a beam hears as it sends."""
         return self._ends(receivers, rows, _Part.received)
 
-    def _ends(self, ends, rows, of):  # type: ignore[no-untyped-def]
+    def _ends(
+        self,
+        ends: Sequence[LineSource],
+        rows: Int[np.ndarray, " rows"] | None,
+        of: "Callable[[_Part, LineSource, np.ndarray], np.ndarray]",
+    ) -> Complex[np.ndarray, "rows ends"]:
         rows = np.arange(self.size) if rows is None else rows
         found = np.empty((len(rows), len(ends)), dtype=np.complex128)
         for here, one in self._groups(rows):
@@ -166,6 +170,7 @@ class _Part:
     def __init__(self, body: Body, polarisation: Polarisation, wavenumber: float) -> None:
         self.body, self.wavenumber = body, wavenumber
         self.curve = CurveOperators(body.contour)
+        self.densities: tuple[str, ...]
         closed, magnetic = body.contour.closed, polarisation == "TE"
         self.inside: complex | None = None
         self.slope_ratio = 1.0 + 0j
@@ -185,6 +190,10 @@ class _Part:
             self.tests = ((1j, 1),) if closed else ((1, 0),)
             self.identity = (0.5,) if closed else (0,)
         count = body.contour.count
+        self.scale = np.ones(count)
+        if magnetic and body.permittivity is None:
+            # N grows as the inverse of the step towards a corner or an edge.
+            self.scale = np.sqrt(body.contour.weights / body.contour.spacing)
         self.size = count * len(self.tests)
         self.points = np.repeat(np.arange(count), len(self.tests))
         self.components = np.tile(np.arange(len(self.tests)), count)
@@ -213,13 +222,13 @@ class _Part:
                 else:
                     field = k * outside.single() if needs_field else 0.0
                     slope = outside.adjoint() if needs_slope else 0.0
-                for row, (of_field, of_slope) in enumerate(self.tests):
-                    whole[row, index] = of_field * field + of_slope * slope
+                for test, (of_field, of_slope) in enumerate(self.tests):
+                    whole[test, index] = of_field * field + of_slope * slope
         if own:
             row, column = np.nonzero(here[:, None] == there)
-            for index, identity in enumerate(self.identity):
-                whole[index, index, row, column] += identity
-        return whole
+            for component, identity in enumerate(self.identity):
+                whole[component, component, row, column] += identity
+        return np.asarray(whole * self.scale[here, None] * source.scale[there])
 
     def _own_dielectric(
         self,
@@ -232,18 +241,19 @@ class _Part:
         k, ratio = self.wavenumber, self.slope_ratio
         inside = Block(self.curve, self.curve, here, there, self.inside)
         # The static parts are subtracted before they are evaluated.
-        whole[0, 0] = outside.double(1 - 1 / ratio) - inside.double(0) / ratio
+        whole[0, 0] = outside.double(1 - 1 / ratio) - inside.double(0.0) / ratio
         whole[0, 1] = k * (outside.single() - inside.single())
         hyper = outside.hypersingular(static=False) - inside.hypersingular(static=False)
         whole[1, 0] = hyper / k
-        whole[1, 1] = outside.adjoint(1 - ratio) - ratio * inside.adjoint(0)
+        whole[1, 1] = outside.adjoint(1 - ratio) - ratio * inside.adjoint(0.0)
 
     def incident(
         self, source: LineSource, points: Int[np.ndarray, " points"]
     ) -> Complex[np.ndarray, "tests points"]:
         """Evaluate the right-hand sides of a source, weighted."""
         field, slope = self._lit(source, points)
-        return np.stack([-(one * field + other * slope) for one, other in self.tests])
+        sides = np.stack([-(one * field + other * slope) for one, other in self.tests])
+        return np.asarray(self.scale[points] * sides)
 
     def received(
         self, receiver: LineSource, points: Int[np.ndarray, " points"]
@@ -251,7 +261,8 @@ class _Part:
         """Evaluate what a receiver hears of the densities, weighted."""
         field, slope = self._lit(receiver, points)
         k = self.wavenumber
-        return np.stack([k * (slope if one == "u" else field) for one in self.densities])
+        heard = np.stack([k * (slope if one == "u" else field) for one in self.densities])
+        return np.asarray(self.scale[points] * heard)
 
     def _lit(
         self, source: LineSource, points: Int[np.ndarray, " points"]
@@ -271,5 +282,3 @@ def dense_fields(
     every = np.arange(problem.size)
     solution = np.linalg.solve(problem.entries(every, every), problem.sides(sources))
     return np.asarray(solution.T @ problem.heard(receivers))
-
-

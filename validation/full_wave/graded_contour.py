@@ -24,15 +24,20 @@ from scipy.special import betainc
 
 from validation.full_wave.conducting_contour import Contour, SplineArc
 
-ORDER, RISE = 4, 20
-"""p, and M: the points over which the spacing rises from a corner. [-]"""
+ORDER, RISE = 5, 40
+"""p, and M: the points over which the spacing rises from a right or blunter corner; of a sharper
+one, whose sides run close to each other, more, as the inverse of its angle. Fields of a conducting
+wedge of 90° then err by some 1e-5. [-]"""
+
+LEAST_ANGLE = float(np.deg2rad(10.0))
+"""Sharpest corner that is sampled. [rad]"""
 
 CLOSE = 1e-9
 """How far the end of a side may be from the start of the next, over its length. [-]"""
 
 
 def cornered_contour(
-    sides: Sequence[Float[np.ndarray, "vertices 2"]], spacings: Sequence[float]
+    sides: Sequence[Float[np.ndarray, "_ 2"]], spacings: Sequence[float]
 ) -> Contour:
     """Sample a closed contour with a corner between every two sides.
 
@@ -47,7 +52,7 @@ def cornered_contour(
     Raises
     ------
     ValueError
-        If the sides do not close, run clockwise, or a spacing is not positive.
+        If the sides do not close, run clockwise, meet too sharply, or a spacing is not positive.
     """
     for index, side in enumerate(sides):
         gap = float(np.hypot(*(sides[(index + 1) % len(sides)][0] - side[-1])))
@@ -61,7 +66,13 @@ def cornered_contour(
     after = np.roll(outline, -1, axis=0)
     if not np.sum(outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0]) > 0:
         raise ValueError("the sides run clockwise; turn them, so that their normals look out")
-    parts = [_side(side, spacing) for side, spacing in zip(sides, spacings, strict=True)]
+    rises = [_rise(side, sides[index - 1]) for index, side in enumerate(sides)]
+    parts = [
+        _side(side, spacing, first, last)
+        for side, spacing, first, last in zip(
+            sides, spacings, rises, [*rises[1:], rises[0]], strict=True
+        )
+    ]
     points, normals, curvatures, speeds = (np.concatenate(one) for one in zip(*parts, strict=True))
     return Contour(
         points=points,
@@ -83,8 +94,21 @@ def box(
     return cornered_contour(sides, [spacing] * 4)
 
 
+def _rise(side: Float[np.ndarray, "vertices 2"], before: Float[np.ndarray, "others 2"]) -> int:
+    """Return the points over which the spacing rises from a corner."""
+    ahead, back = side[1] - side[0], before[-2] - before[-1]
+    cosine = float(ahead @ back / (np.hypot(*ahead) * np.hypot(*back)))
+    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    if angle < LEAST_ANGLE:
+        raise ValueError(
+            f"two sides meet at {np.rad2deg(angle):.3g}°, less than the "
+            f"{np.rad2deg(LEAST_ANGLE):.3g}° that can be sampled; blunt the corner"
+        )
+    return round(RISE * max(1.0, 0.5 * np.pi / angle))
+
+
 def _side(
-    side: Float[np.ndarray, "vertices 2"], spacing: float
+    side: Float[np.ndarray, "vertices 2"], spacing: float, first: int, last: int
 ) -> tuple[
     Float[np.ndarray, "n 2"],
     Float[np.ndarray, "n 2"],
@@ -95,19 +119,21 @@ def _side(
         side = side[0] + np.linspace(0, 1, 4)[:, None] * (side[1] - side[0])
     arc = SplineArc(side)
     # The rise at either end takes half its points' arc.
-    count = max(int(np.ceil(arc.length / spacing)) + RISE, 2 * RISE)
-    step = arc.length / (count - RISE)
+    rising = 0.5 * (first + last)
+    count = max(int(np.ceil(arc.length / spacing + rising)), first + last)
+    step = arc.length / (count - rising)
     index = np.arange(count) + 0.5
-    first, last = np.minimum(index / RISE, 1.0), np.minimum((count - index) / RISE, 1.0)
-    rate = betainc(ORDER, ORDER, first) * betainc(ORDER, ORDER, last)
-    along = _risen(index) * step
-    along = np.where(index > 0.5 * count, arc.length - _risen(count - index) * step, along)
+    start, end = np.minimum(index / first, 1.0), np.minimum((count - index) / last, 1.0)
+    rate = betainc(ORDER, ORDER, start) * betainc(ORDER, ORDER, end)
+    along = _risen(index, first) * step
+    backward = arc.length - _risen(count - index, last) * step
+    along = np.where(index > first, backward, along)
     points, normals, curvatures, pace = arc.sampled(along)
     return points, normals, curvatures, np.asarray(step * rate * pace)
 
 
-def _risen(index: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _risen(index: Float[np.ndarray, " n"], rise: int) -> Float[np.ndarray, " n"]:
     r"""Integrate the rise from a corner, :math:`\int_0^x I_t = x I_x(p, p) - I_x(p + 1, p)/2`."""
-    part = np.minimum(index / RISE, 1.0)
-    rising = RISE * (part * betainc(ORDER, ORDER, part) - 0.5 * betainc(ORDER + 1, ORDER, part))
-    return np.asarray(rising + np.maximum(index - RISE, 0.0))
+    part = np.minimum(index / rise, 1.0)
+    rising = rise * (part * betainc(ORDER, ORDER, part) - 0.5 * betainc(ORDER + 1, ORDER, part))
+    return np.asarray(rising + np.maximum(index - rise, 0.0))

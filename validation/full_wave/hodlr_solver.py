@@ -63,7 +63,7 @@ class Link:
     @property
     def rank(self) -> int:
         """The larger of both blocks' ranks."""
-        return max(self.left.shape[1], self.lower_left.shape[1])
+        return int(max(self.left.shape[1], self.lower_left.shape[1]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,8 @@ For a wavenumber :math:`k`, real or of a lossy medium, with :math:`G = -\tfrac j
 :math:`\mathbf R = \mathbf r - \mathbf r'`, and normals :math:`\hat n` at the receiving and
 :math:`\hat n'` at the sending point,
 
-.. math:: S = G, \quad D = \partial_{n'} G, \quad K' = \partial_n G, \quad N = \partial_n \partial_{n'} G
+.. math:: S = G, \quad D = \partial_{n'} G, \quad K' = \partial_n G, \quad
+          N = \partial_n \partial_{n'} G
 
 are written with :math:`E = G'(z)/z + 1/2\pi z^2`, :math:`z = kR`, which has no pole. So the part
 of the static field stands alone, and cancels exactly where two media are subtracted:
@@ -12,15 +13,16 @@ of the static field stands alone, and cancels exactly where two media are subtra
 .. math:: D = \frac{\hat n' \cdot \mathbf R}{2\pi R^2} - k^2 E\, \hat n' \cdot \mathbf R, \qquad
           K' = -\frac{\hat n \cdot \mathbf R}{2\pi R^2} + k^2 E\, \hat n \cdot \mathbf R
 
-.. math:: N = \frac{c}{2\pi R^2} - k^2 (E c - G\, \hat n \cdot \hat R\, \hat n' \cdot \hat R), \qquad
-          c = \hat n \cdot \hat n' - 2\, \hat n \cdot \hat R\, \hat n' \cdot \hat R
+.. math:: N = \frac{c}{2\pi R^2} - k^2 (E c - G\, \hat n \cdot \hat R\, \hat n' \cdot \hat R),
+          \qquad c = \hat n \cdot \hat n' - 2\, \hat n \cdot \hat R\, \hat n' \cdot \hat R
 
 On a curve's own points the trapezoidal rule is corrected. The logarithm of :math:`G` has the
 coefficient :math:`-J_0(z)/2\pi`, that of :math:`E` :math:`J_1(z)/2\pi z`
-(:mod:`validation.full_wave.log_quadrature`). The pole :math:`1/2\pi R^2` is integrated as Hadamard's finite
-part: over the step :math:`h` of the parameter, a wave of phase :math:`\omega` from point to point
-gets :math:`\sum_{j \ne 0} e^{j\omega n}/n^2 = \pi^2/3 - \pi|\omega| + \omega^2/2` from the rule
-and should get :math:`-\pi|\omega|`, so
+(:mod:`validation.full_wave.log_quadrature`). The pole :math:`1/2\pi R^2` is integrated as
+Hadamard's finite part: over the step :math:`h` of the parameter, a wave of phase :math:`\omega`
+from point to point gets
+:math:`\sum_{n \ne 0} e^{j\omega n}/n^2 = \pi^2/3 - \pi|\omega| + \omega^2/2` from the rule and
+should get :math:`-\pi|\omega|`, so
 
 .. math:: N_{ii} \mathrel{-}= \frac{\pi}{6 w_i} - \frac{h^2 \{s\}_i}{12 \pi w_i}
           - \frac{w_i \kappa_i^2}{24\pi}, \qquad
@@ -195,7 +197,7 @@ class CurveOperators:
 
 
 class Block:
-    """One block of the four operators, in one medium.
+    r"""One block of the four operators, in one medium.
 
     Parameters
     ----------
@@ -204,7 +206,7 @@ class Block:
     rows, columns
         Points of either.
     wavenumber
-        Of the medium; :math:`\\operatorname{Im} k \\le 0`. [rad/m]
+        Of the medium; :math:`\operatorname{Im} k \le 0`. [rad/m]
     """
 
     def __init__(
@@ -213,14 +215,14 @@ class Block:
         source: CurveOperators,
         rows: Int[np.ndarray, " rows"],
         columns: Int[np.ndarray, " columns"],
-        wavenumber: complex,
+        wavenumber: complex | float,
     ) -> None:
-        self.wavenumber = wavenumber
+        self.wavenumber = complex(wavenumber)
         self._own = to is source
         self._geometry = _Geometry(to, source, rows, columns)
         geometry = self._geometry
-        real = wavenumber.real if wavenumber.imag == 0 else wavenumber
-        phase = real * geometry.apart
+        k = self.wavenumber
+        phase = (k.real if k.imag == 0 else k) * geometry.apart
         self.green, self.slope = green_and_slope(phase)
         if self._own:
             self._correct(to, rows, columns, phase)
@@ -255,17 +257,17 @@ class Block:
         """Evaluate S, weighted. [m]."""
         return np.asarray(self._weights * self.green)
 
-    def double(self, static: complex = 1.0) -> Matrix:
+    def double(self, static: complex | float = 1.0) -> Matrix:
         """Evaluate D, weighted, with a multiple of its static part. [-]."""
         facing = self._geometry.sending
         return self._facing(static * facing, -(self.wavenumber**2) * facing, static)
 
-    def adjoint(self, static: complex = 1.0) -> Matrix:
+    def adjoint(self, static: complex | float = 1.0) -> Matrix:
         """Evaluate K', weighted, with a multiple of its static part. [-]."""
         facing = self._geometry.receiving
         return self._facing(-static * facing, self.wavenumber**2 * facing, static)
 
-    def _facing(self, pole: Matrix, wave: Matrix, static: complex) -> Matrix:
+    def _facing(self, pole: Matrix, wave: Matrix, static: complex | float) -> Matrix:
         geometry = self._geometry
         pole = pole / (2 * np.pi * geometry.apart)
         if self._own:

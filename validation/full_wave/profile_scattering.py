@@ -40,7 +40,7 @@ POINTS_PER_WAVELENGTH = 6.5
 Permittivity = complex | Callable[[Float[np.ndarray, " freqs"]], Complex[np.ndarray, " freqs"]]
 """ε' - jε'', one for all frequencies or a function of them in Hz. [-]"""
 
-Ends = Sequence[LineSource] | Float[np.ndarray, "places axis"]
+Ends = Sequence[LineSource] | Float[np.ndarray, "_ _"]
 """Sources or receivers; bare places are isotropic, third coordinates are left out."""
 
 
