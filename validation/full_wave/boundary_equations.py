@@ -106,6 +106,11 @@ class BoundaryProblem:
         """Number of unknowns."""
         return len(self._owner)
 
+    @property
+    def symmetric(self) -> bool:
+        """Whether the matrix is: that of open strips alone."""
+        return all(not part.body.contour.closed for part in self._parts)
+
     def entries(
         self, rows: Int[np.ndarray, " rows"], columns: Int[np.ndarray, " columns"]
     ) -> Matrix:

@@ -71,14 +71,40 @@ def link_fields(
     return np.asarray(sent.spread.T @ between @ heard.spread)
 
 
+def array_fields(
+    problem: BoundaryProblem, array: Sequence[LineSource], users: Sequence[LineSource]
+) -> Complex[np.ndarray, "ways places"]:
+    """Solve for an array's echo, place by place, and for what each user sends to it.
+
+    Parameters
+    ----------
+    problem
+        The scene.
+    array, users
+        Outside of the bodies.
+
+    Returns
+    -------
+    First the echo, then each user's scattered field, at all places of the array.
+
+    Raises
+    ------
+    FullWaveError
+        If the solution does not satisfy the equation.
+    """
+    lit = _lit(problem, array)
+    some = _some(array, lit)
+    between = _between(problem, [*some, *users], some)
+    own, sent = between[: len(some)], between[len(some) :]
+    echo = np.einsum("rp,rs,sp->p", lit.spread, own, lit.spread, optimize=True)
+    return np.concatenate([echo[None], sent @ lit.spread])
+
+
 def echo_fields(
     problem: BoundaryProblem, places: Sequence[LineSource]
 ) -> Complex[np.ndarray, " places"]:
     """Solve for the scattered field of each source at its own place; see :func:`link_fields`."""
-    lit = _lit(problem, places)
-    some = _some(places, lit)
-    between = _between(problem, some, some)
-    return np.asarray(np.einsum("rp,rs,sp->p", lit.spread, between, lit.spread, optimize=True))
+    return np.asarray(array_fields(problem, places, [])[0])
 
 
 def _some(ends: Sequence[LineSource], lit: Lit) -> list[LineSource]:
@@ -106,7 +132,7 @@ def _between(
             problem.size,
             leaf=LEAF,
             tolerance=TOLERANCE,
-            symmetric=False,
+            symmetric=problem.symmetric,
             sampling=sampling,
         )
         solution = solve(matrix, sides)

@@ -35,7 +35,7 @@ def test_waves_round_a_circle_are_eigenfunctions(wavenumber: complex, order: int
     block = Block(curve, curve, every, every, wavenumber)
     wave = np.exp(1j * order * np.arctan2(body.normals[:, 1], body.normals[:, 0]))
     phase, round_ = wavenumber * radius, -0.5j * np.pi * radius
-    bessel, hankel = jv(order, phase), hankel2(order, phase)
+    bessel, hankel = jv(np.asarray(order), phase), hankel2(order, phase)
     slopes = jvp(order, phase), h2vp(order, phase)
     mixed = 0.5 * round_ * wavenumber * (slopes[0] * hankel + bessel * slopes[1])
     for found, value in (
