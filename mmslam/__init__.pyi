@@ -3,6 +3,7 @@ from .commands.design import design
 from .commands.sweep import sweep
 from .commands.track import track
 from .datasets import open_dataset
+from .full_wave import simulate_full_wave
 from .library import Scenario, load_scenario, scenarios
 from .measurement import Echo, Measurement, Uplink
 from .measurement_files import import_measured, read, write
@@ -30,6 +31,7 @@ __all__ = [
     "read",
     "scenarios",
     "simulate",
+    "simulate_full_wave",
     "sweep",
     "track",
     "write",

@@ -90,6 +90,14 @@ def simulate(
     output: OutFile,
     overrides: Overrides = None,
     seed: Seed = 0,
+    full_wave: Annotated[
+        bool,
+        typer.Option(
+            "--full-wave",
+            help="Solve the wave equation by integral equations in place of tracing rays: small "
+            "2-D scenes in cylindrical waves. Says first what it takes.",
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate the measurement of a scenario, and write it with its truth to one file."""
@@ -98,9 +106,20 @@ def simulate(
 
         loaded = mmslam.load_scenario(scenario, overrides or [])
         with stdout_kept_clean(), StageProgress() as progress:
-            from mmslam.pipeline import simulate_to_file
+            if full_wave:
+                from mmslam.full_wave import solve_to_file
 
-            measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
+                measurement = solve_to_file(
+                    loaded,
+                    seed=seed,
+                    path=output,
+                    tell=lambda told: typer.echo(told, err=True),
+                    progress=progress,
+                )
+            else:
+                from mmslam.pipeline import simulate_to_file
+
+                measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
         print_written(output, measurement, as_json)
 
 

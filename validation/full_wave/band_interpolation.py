@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from validation.full_wave.strip_scattering import StripFields, StripScene, strip_fields
@@ -29,6 +29,10 @@ MOST_ERROR = 1e-3
 """Of the interpolation, over the field's norm: 40 dB below a noise of 20 dB SNR. [-]"""
 
 
+Solved = Callable[[Float[np.ndarray, " wanted"]], Complex[np.ndarray, "ways positions wanted"]]
+"""Fields of some ways at all positions, for frequencies in Hz."""
+
+
 def band_fields(
     scene: StripScene,
     frequencies: Float[np.ndarray, " freqs"],
@@ -38,7 +42,7 @@ def band_fields(
     workers: int | None = None,
     advance: Callable[[int, int], None] = lambda done, steps: None,
 ) -> StripFields:
-    """Solve at Chebyshev nodes of a band and interpolate.
+    """Solve for a strip at Chebyshev nodes of a band and interpolate.
 
     Parameters
     ----------
@@ -56,38 +60,68 @@ def band_fields(
     FullWaveError
         If a solution does not satisfy its equation.
     """
-    start, stop = float(frequencies[0]), float(frequencies[-1])
-    delays, half_window = _delays(scene)
+
+    def solved(
+        wanted: Float[np.ndarray, " wanted"],
+    ) -> Complex[np.ndarray, "ways positions wanted"]:
+        fields = strip_fields(scene, wanted, folder=folder, workers=workers, advance=advance)
+        return np.concatenate([fields.echo[None], fields.uplinks])
+
+    whole = interpolated_fields(solved, frequencies, *_delays(scene), most_error=most_error)
+    return StripFields(echo=whole[0], uplinks=whole[1:])
+
+
+def interpolated_fields(
+    solved: Solved,
+    frequencies: Float[np.ndarray, " freqs"],
+    delays: Float[np.ndarray, "ways positions"],
+    half_window: float,
+    *,
+    most_error: float = MOST_ERROR,
+) -> Complex[np.ndarray, "ways positions freqs"]:
+    """Solve at Chebyshev nodes of a band and interpolate; at all frequencies where that fails.
+
+    Parameters
+    ----------
+    solved
+        Solves.
+    frequencies
+        Where the fields are wanted, increasing. [Hz]
+    delays, half_window
+        Of each way at each position, and how far from there most of it arrives. [s]
+    most_error
+        Of the interpolation, over the norm of each way's field. [-]
+    """
     for margin in MARGINS:
-        needed = math.ceil(margin * np.pi * (stop - start) * half_window) + EXTRA
+        needed = nodes_needed(frequencies, half_window, margin)
         if needed + len(COMPARED) >= len(frequencies):
             break
-        found, error = _interpolated(
-            scene, frequencies, delays, needed, folder=folder, workers=workers, advance=advance
-        )
+        found, error = _interpolated(solved, frequencies, delays, needed)
         if error < most_error:
             return found
-    return strip_fields(scene, frequencies, folder=folder, workers=workers, advance=advance)
+    return solved(frequencies)
+
+
+def nodes_needed(
+    frequencies: Float[np.ndarray, " freqs"], half_window: float, margin: float = MARGINS[0]
+) -> int:
+    """Return how many nodes carry a band; parameters as in :func:`interpolated_fields`."""
+    return math.ceil(margin * np.pi * float(np.ptp(frequencies)) * half_window) + EXTRA
 
 
 def _interpolated(
-    scene: StripScene,
+    solved: Solved,
     frequencies: Float[np.ndarray, " freqs"],
     delays: Float[np.ndarray, "ways positions"],
     needed: int,
-    *,
-    folder: Path | None,
-    workers: int | None,
-    advance: Callable[[int, int], None],
-) -> tuple[StripFields, float]:
+) -> tuple[Complex[np.ndarray, "ways positions freqs"], float]:
     """Return the interpolated fields, and how far they are off between the nodes. [-]."""
     start, stop = float(frequencies[0]), float(frequencies[-1])
     angles = np.pi * (np.arange(needed) + 0.5) / needed
     nodes = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(angles)
     between = start + (stop - start) * np.array(COMPARED)
     wanted = np.concatenate([nodes, between])
-    solved = strip_fields(scene, wanted, folder=folder, workers=workers, advance=advance)
-    fields = np.concatenate([solved.echo[None], solved.uplinks])
+    fields = solved(wanted)
     smooth = fields * np.exp(2j * np.pi * delays[..., None] * wanted)
     asked = np.concatenate([frequencies, between])
     spread = _chebyshev_interpolation(nodes, angles, asked)
@@ -97,8 +131,7 @@ def _interpolated(
         float(np.linalg.norm(one) / np.linalg.norm(whole))
         for one, whole in zip(missed, fields[..., needed:], strict=True)
     )
-    kept = found[..., : len(frequencies)]
-    return StripFields(echo=kept[0], uplinks=kept[1:]), worst
+    return found[..., : len(frequencies)], worst
 
 
 def _delays(scene: StripScene) -> tuple[Float[np.ndarray, "ways positions"], float]:

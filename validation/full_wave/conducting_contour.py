@@ -112,6 +112,8 @@ class SplineArc:
     ----------
     profile
         At least four points from end to end; a third coordinate is left out. [m]
+    periodic
+        Whether the last point is the first one, and the curve smooth there.
 
     Raises
     ------
@@ -119,7 +121,9 @@ class SplineArc:
         If points are missing or coincide.
     """
 
-    def __init__(self, profile: Float[np.ndarray, "vertices axis"]) -> None:
+    def __init__(
+        self, profile: Float[np.ndarray, "vertices axis"], *, periodic: bool = False
+    ) -> None:
         chords = np.hypot(*np.diff(profile[:, :2], axis=0).T)
         if len(profile) < 4 or not np.all(chords > 0):
             raise ValueError(
@@ -127,7 +131,9 @@ class SplineArc:
                 f"{chords.min(initial=np.inf):g} m: at least four points that differ are needed"
             )
         ends = np.concatenate([[0.0], np.cumsum(chords)])
-        self._curve = CubicSpline(ends, profile[:, :2])
+        self._curve = CubicSpline(
+            ends, profile[:, :2], bc_type="periodic" if periodic else "not-a-knot"
+        )
         self._slope = self._curve.derivative()
         inner = np.arange(FINER * (len(ends) - 1) + 1) / FINER
         fine = np.interp(inner, np.arange(len(ends)), ends)
@@ -192,6 +198,38 @@ def closed_contour(
         normals=np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) / speeds[:, None],
         speeds=speeds,
         curvatures=_curvature(tangent, bend),
+        step=2 * np.pi / count,
+        closed=True,
+    )
+
+
+def closed_profile(vertices: Float[np.ndarray, "vertices axis"], *, spacing: float) -> Contour:
+    """Sample a smooth closed curve through points, evenly.
+
+    Parameters
+    ----------
+    vertices
+        Counter-clockwise, the first one not repeated; a third coordinate is left out. [m]
+    spacing
+        Arc length between points of the grid, at most. [m]
+
+    Raises
+    ------
+    ValueError
+        If points are missing or coincide, or run clockwise, or the spacing is not positive.
+    """
+    _check_spacing(spacing)
+    round_ = np.concatenate([vertices, vertices[:1]])[:, :2]
+    if not np.sum(round_[:-1, 0] * round_[1:, 1] - round_[:-1, 1] * round_[1:, 0]) > 0:
+        raise ValueError("the closed curve runs clockwise; turn it, so that its normals look out")
+    arc = SplineArc(round_, periodic=True)
+    count = max(int(np.ceil(arc.length / spacing)), 32)
+    points, normals, curvatures, pace = arc.sampled(arc.length * np.arange(count) / count)
+    return Contour(
+        points=points,
+        normals=normals,
+        speeds=np.asarray(arc.length / (2 * np.pi) * pace),
+        curvatures=curvatures,
         step=2 * np.pi / count,
         closed=True,
     )
