@@ -8,6 +8,7 @@ from .canonical_scatterers import (
     ports,
     sphere_series,
 )
+from .line_source_scattering import cylinder_field, slab_fields, wedge_field
 from .point_scatterer import complex_noise, point_echo, point_uplink
 from .rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link
 from .sionna_paths import (
@@ -26,6 +27,7 @@ __all__ = [
     "compare_paths",
     "complex_noise",
     "cylinder_echo_over_series",
+    "cylinder_field",
     "distance_from_edges",
     "facets_cross_section",
     "half_shadowed_plate",
@@ -39,6 +41,8 @@ __all__ = [
     "point_uplink",
     "ports",
     "random_scene",
+    "slab_fields",
     "solver_scene",
     "sphere_series",
+    "wedge_field",
 ]

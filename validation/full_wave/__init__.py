@@ -1,7 +1,8 @@
-"""Two-dimensional full wave, by the method of moments: the reference for the simulator.
+"""Two-dimensional full wave, by boundary integral equations: the reference for the simulator.
 
-A solver for perfect conductors (TM_z), hierarchical so that long walls fit, and comparisons with
-physical optics on the very same profile.
+Conductors and homogeneous dielectrics, open strips and closed bodies with corners, TM and TE, solved
+hierarchically so that long walls fit; whole scenarios; and comparisons with physical optics on the
+very same profile.
 """
 
 import lazy_loader

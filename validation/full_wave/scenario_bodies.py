@@ -67,9 +67,9 @@ def scenario_bodies(scenario: Scenario, *, seed: int, sample: int = 0) -> Scenar
     ScenarioError
         If something in the scenario cannot be solved for; all of it is listed.
     """
-    found = [*_general_problems(scenario)]
+    found = _general_problems(scenario)
     materials: dict[str, Material] = {}
-    if not found:
+    if scenario.dimensions == 2:
         materials = scenario_materials(scenario)
         for name, material in materials.items():
             found += _object_problems(scenario, name, material)

@@ -26,6 +26,7 @@ from scipy.constants import speed_of_light
 from threadpoolctl import threadpool_limits
 
 from validation.full_wave.conducting_contour import Contour, open_strip
+from validation.full_wave.direct_solution import FullWaveError
 from validation.full_wave.hodlr_solver import chosen_columns, compress, solve
 from validation.full_wave.line_source import LineSource, greens_function
 from validation.full_wave.method_of_moments import strip_entries
@@ -52,10 +53,6 @@ SOLVER = (
     "strip_scattering",
 )
 """Modules that a stored solution depends on: those of another version are solved anew."""
-
-
-class FullWaveError(RuntimeError):
-    """A solution does not satisfy its equation."""
 
 
 @dataclass(frozen=True, kw_only=True)
