@@ -82,9 +82,9 @@ def wedge_field(
     Of the total field, inside :math:`0 < \varphi < \beta`,
 
     .. math:: u = -\frac{j\pi}{2\beta} \sum_n \epsilon_n J_{\nu}(kr) H_{\nu}^{(2)}(kr_0)
-              \begin{cases}\sin\nu\varphi \sin\nu\varphi_0 & \text{TM} \\
-              \cos\nu\varphi \cos\nu\varphi_0 & \text{TE}\end{cases}, \quad \nu = n\pi/\beta
+              \sin\nu\varphi \sin\nu\varphi_0, \quad \nu = n\pi/\beta
 
+    (TM; cosines in TE; :math:`\epsilon_n` is 2, and 1 for :math:`n = 0`)
     the incident one is subtracted. :math:`\beta = 2\pi` is a half plane.
 
     Parameters

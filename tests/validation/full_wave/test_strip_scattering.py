@@ -8,10 +8,10 @@ from scipy.constants import speed_of_light
 
 import validation.full_wave.strip_scattering as module
 from validation.full_wave.band_interpolation import band_fields
+from validation.full_wave.direct_solution import FullWaveError
 from validation.full_wave.line_source import LineSource
 from validation.full_wave.method_of_moments import scattered_fields
 from validation.full_wave.strip_scattering import (
-    FullWaveError,
     StripScene,
     strip_fields,
     strip_response,
