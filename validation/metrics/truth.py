@@ -132,7 +132,8 @@ def read_truth_dataset(path: Path, *, sample: int | None = None) -> xr.Dataset |
     try:
         with xr.open_zarr(path, group="truth", consolidated=False, chunks=None) as lazy:
             chosen = lazy.isel(sample=sample or 0) if "sample" in lazy.dims else lazy
-            return chosen.load()
+            dataset: xr.Dataset = chosen.load()
+            return dataset
     except Exception as error:  # Zarr, codecs and JSON fail in many ways on a damaged store
         raise MeasurementError(
             f"{group}: the truth cannot be read ({type(error).__name__}: {error}); delete that "
