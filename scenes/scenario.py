@@ -112,7 +112,15 @@ class Scenario(Checked):
     waves: Literal["spherical", "cylindrical"] = Field(
         "spherical", description="'spherical', or 'cylindrical' (2-D full wave)"
     )
-    max_bounces: int = Field(3, ge=0, le=8, description="the longest chain of mirrors")
+    max_bounces: int = Field(
+        3,
+        ge=0,
+        le=8,
+        description=(
+            "the most surfaces that a wave meets between two antennas (0: the line of sight, and "
+            "no echo of surfaces)"
+        ),
+    )
     radio: Radio = Field(description="the table [radio]")
     base_station: BaseStation = Field(description="the table [base_station]")
     objects: dict[Name, SceneObject] = Field(default_factory=dict, description="objects by name")
@@ -283,7 +291,7 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
                 f"{scenario.max_bounces}; set max_bounces = 1, or leave transmit_offset_m out"
             )
     points |= antenna_places(scenario.base_station)
-    if flat and scenario.base_station.multistatic and scenario.max_bounces > 1:
+    if scenario.base_station.multistatic and scenario.max_bounces > 1:
         found.append(
             f"max_bounces = {scenario.max_bounces}: with transmitter and receiver apart, echoes of "
             "one bounce only are known; set max_bounces = 1, or give base_station.elements alone"

@@ -9,6 +9,24 @@ from jaxtyping import Complex, Float
 from scipy.signal import lfilter
 
 
+def complex_noise(
+    shape: tuple[int, ...], variance: float, rng: np.random.Generator
+) -> Complex[np.ndarray, "..."]:
+    """Draw white circular Gaussian noise of a variance per complex sample.
+
+    Parameters
+    ----------
+    shape
+        Of the samples.
+    variance
+        Mean power of each. [-]
+    rng
+        Stream of this noise.
+    """
+    pair = rng.standard_normal((*shape, 2)) * np.sqrt(0.5 * variance)
+    return np.asarray(pair[..., 0] + 1j * pair[..., 1])
+
+
 def thermal_noise(
     samples: Complex[np.ndarray, "*n"], *, snr_db: float, rng: np.random.Generator
 ) -> Complex[np.ndarray, "*n"]:
@@ -37,10 +55,7 @@ def thermal_noise(
             f"the noise is set to {snr_db} dB below the signal, but the signal's mean power is "
             f"{power}: nothing reaches the antennas; open a path or remove the noise"
         )
-    per_component = np.sqrt(0.5 * power) * 10.0 ** (-snr_db / 20.0)
-    noise = rng.standard_normal((*samples.shape, 2)) * per_component
-    noisy: np.ndarray = samples + (noise[..., 0] + 1j * noise[..., 1])
-    return noisy
+    return samples + complex_noise(samples.shape, power / 10 ** (snr_db / 10), rng)
 
 
 def phase_noise(

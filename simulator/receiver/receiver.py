@@ -7,6 +7,7 @@ from scenes.random_streams import random_stream
 from scenes.scenario import Scenario, ScenarioError
 from simulator.receiver.impairments import (
     clock_offset,
+    complex_noise,
     gain_ripple,
     limited_dynamic_range,
     phase_noise,
@@ -98,6 +99,6 @@ def _noisy(signals: Signals, scenario: Scenario, *, seed: int, sample: int) -> S
         if name in heard:
             recorded[name] = thermal_noise(values, snr_db=snr_db, rng=rng)
         else:
-            level = np.full(values.shape, np.sqrt(min(heard.values())), dtype=np.complex128)
-            recorded[name] = thermal_noise(level, snr_db=snr_db, rng=rng) - level
+            variance = min(heard.values()) / 10 ** (snr_db / 10)
+            recorded[name] = complex_noise(values.shape, variance, rng)
     return recorded

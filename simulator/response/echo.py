@@ -23,7 +23,7 @@ def simulate_echo(
     advance: Callable[[], None],
     over_several: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "positions freqs"]:
-    """Simulate the noise-free echo: over one bounce, in 2-D also over two and three.
+    """Simulate the noise-free echo: over one surface, and over up to ``max_bounces``.
 
     Parameters
     ----------

@@ -2,7 +2,8 @@ r"""What ideal points scatter: the radar equation, each leg tested for occlusion
 
 .. math:: S = \frac{\lambda \sqrt{\sigma}}{(4\pi)^{3/2} R_t R_r} g_t g_r e^{-jk(R_t + R_r)}
 
-Points see neither each other nor the mirrors: only the direct ways count.
+Points see neither each other nor the mirrors: only the direct ways count. They are no surfaces, and
+what they return is no bounce: it is there with ``max_bounces = 0``, too.
 """
 
 from typing import NamedTuple

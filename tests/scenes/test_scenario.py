@@ -247,7 +247,7 @@ REFUSED: list[tuple[Table, str]] = [
     ({"users__user__position_m": "ab"}, r"^users\.user\.position_m = 'ab': must be a position"),
     ({"users__user__position_m": ["a", 1]}, r"^users\.user\.position_m\.0 = 'a': must be a valid"),
     # out of range
-    ({"max_bounces": 9}, r"^max_bounces = 9: must be less than or equal to 8; give the longest"),
+    ({"max_bounces": 9}, r"^max_bounces = 9: must be less than or equal to 8; give the most"),
     ({"max_bounces": -1}, r"^max_bounces = -1: must be greater than or equal to 0"),
     ({"radio__points": 1}, r"^radio\.points = 1: must be greater than or equal to 2"),
     ({"radio__points": 10**6}, r"^radio\.points = 1000000: must be less than or equal to 100000"),

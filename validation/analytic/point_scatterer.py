@@ -5,6 +5,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, Uplink, Waves
+from simulator.receiver.impairments import complex_noise as complex_noise
 
 
 def point_echo(
@@ -99,9 +100,3 @@ def point_uplink(
         turns = np.outer(length, 1 / wavelength)
         samples += np.outer(spread, wavelength) * np.exp(-2j * np.pi * turns + 1j * shift)
     return Uplink(samples=samples, positions=positions, frequencies=frequencies, user=user)
-
-
-def complex_noise(shape: tuple[int, ...], variance: float, rng: np.random.Generator) -> np.ndarray:
-    """Draw circular Gaussian noise of a variance per complex sample."""
-    pair = rng.normal(scale=np.sqrt(variance / 2), size=(*shape, 2))
-    return np.asarray(pair[..., 0] + 1j * pair[..., 1])

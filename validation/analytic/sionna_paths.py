@@ -24,7 +24,8 @@ LIMIT_LENGTH = 1e-6  # how far lengths may be apart [m]
 LIMIT_AMPLITUDE = 0.01  # and amplitudes, of the larger of theirs and NULL of free space's [-]
 
 EDGE = 1e-4
-"""Hits and legs closer than this to an edge may be decided either way: the issue's limit. [m]"""
+"""Hits and legs closer than this to an edge may be decided either way: theirs are found in single
+precision, whose rounding over some metres and several reflections comes to a few µm. [m]"""
 
 SHORTEST_LEG = 1e-2
 """The path solver drops paths with a leg below its MIN_SEGMENT_LENGTH. [m]"""

@@ -27,6 +27,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
+from validation.bounds.no_bound import NoBound
+
 LEAST_CONDITION = 1e-12
 """Least eigenvalue of the information, scaled to a unit diagonal, at which positions are fixed:
 below it the inverse has lost twelve of sixteen digits. [-]"""
@@ -322,7 +324,7 @@ def _inverse(information: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
     scaled = information * np.outer(scale, scale)
     least = float(np.linalg.eigvalsh(scaled)[0])
     if not least > LEAST_CONDITION:
-        raise ValueError(
+        raise NoBound(
             f"these paths do not fix the position (least eigenvalue of the scaled information "
             f"{least:.1g}, the limit is {LEAST_CONDITION:g}); give more paths, a bandwidth, an "
             "aperture (in space a planar one), or what is known of planes and clock"

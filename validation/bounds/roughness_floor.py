@@ -30,6 +30,7 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from scenes.schema.roughness import Roughness
 from simulator.scene.array_antennas import array_group, user_group
+from validation.bounds.no_bound import NoBound
 from validation.bounds.position_bound import (
     Plane,
     PositionBound,
@@ -76,9 +77,9 @@ def roughness_floor(scenario: Scenario, user: str, wall: str) -> RoughnessFloor:
         raise ValueError(f"scenario {scenario.name!r} has no object {wall!r}; it has: {known}")
     body = scenario.objects[wall]
     if scenario.dimensions != 2:
-        raise ValueError(f"scenario {scenario.name!r} has 3 dimensions; this floor is for 2")
+        raise NoBound(f"scenario {scenario.name!r} has 3 dimensions; this floor is for 2")
     if not isinstance(body, Plate) or body.roughness is None or not body.roughness.rms > 0:
-        raise ValueError(f"objects.{wall} is no rough plate; give one with roughness.rms_mm > 0")
+        raise NoBound(f"objects.{wall} is no rough plate; give one with roughness.rms_mm > 0")
     radio = scenario.radio.frequencies
     frequencies = np.linspace(radio[0], radio[-1], min(FREQUENCIES, radio.size))
     start, end = plate_segment(body)
@@ -88,7 +89,7 @@ def roughness_floor(scenario: Scenario, user: str, wall: str) -> RoughnessFloor:
     normal *= np.sign(normal @ (positions.mean(axis=0) - centre))
     place = scenario.users[user].position
     if not normal @ (place - centre) > 0:
-        raise ValueError(f"objects.{wall} does not face both {user!r} and the array; move one")
+        raise NoBound(f"objects.{wall} does not face both {user!r} and the array; move one")
     finest = min(body.roughness.correlation_length, speed_of_light / frequencies[-1] / 2)
     count = int(np.ceil(STEPS_PER_DETAIL * np.linalg.norm(end - start) / finest))
     step = float(np.linalg.norm(end - start)) / count

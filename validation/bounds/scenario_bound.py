@@ -22,6 +22,7 @@ from simulator.scene.radio_scene import scenario_materials
 from simulator.scene.scene_mirrors import scene_mirrors
 from simulator.specular.image_method import find_chains
 from simulator.specular.path_field import specular_response
+from validation.bounds.no_bound import NoBound
 from validation.bounds.position_bound import Plane, PositionBound, position_error_bound
 
 
@@ -86,7 +87,7 @@ def user_waves(scenario: Scenario, user: str, *, weakest_db: float = -60.0) -> U
     levels = np.array([float(np.mean(np.abs(wave) ** 2)) for wave in waves])
     kept = np.flatnonzero(levels > 10 ** (weakest_db / 10) * levels.max(initial=0.0))
     if not kept.size:
-        raise ValueError(
+        raise NoBound(
             f"scenario {scenario.name!r}: no specular path leads from {user!r} to the array; "
             "move the user or what hides it"
         )
@@ -144,7 +145,7 @@ def scenario_position_bound(
     """
     level = scenario.noise.snr_db if snr_db is None else snr_db
     if not np.isfinite(level):
-        raise ValueError(f"snr_db = {level}: without noise the bound is 0; give a finite level")
+        raise NoBound(f"snr_db = {level}: without noise the bound is 0; give a finite level")
     if clock_deviation is None:
         clock_deviation = 0.0 if scenario.impairments.clock_known else float("inf")
     heard = user_waves(scenario, user)

@@ -31,6 +31,7 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from simulator.materials.layered_media import Absorber
 from simulator.scene.radio_scene import scenario_materials
+from validation.bounds.no_bound import NoBound
 
 HALF_POWER = 0.886
 """Width of a sinc's main lobe at half its power, over its first zero. [-]"""
@@ -56,7 +57,7 @@ def line_covariance(
         If there are fewer than two places: they fix no line.
     """
     if cells < 2:
-        raise ValueError(
+        raise NoBound(
             f"{cells:.2g} resolution cells on a wall of {length:g} m fix no line; "
             "give at least 2: a longer wall or a larger aperture"
         )
@@ -128,15 +129,15 @@ def wall_covariance_bound(
         raise ValueError(f"scenario {scenario.name!r} has no object {wall!r}; it has: {known}")
     body = scenario.objects[wall]
     if scenario.dimensions != 2:
-        raise ValueError(f"scenario {scenario.name!r} has 3 dimensions; this bound is for 2")
+        raise NoBound(f"scenario {scenario.name!r} has 3 dimensions; this bound is for 2")
     rough = body.roughness
     if not isinstance(body, Plate) or rough is None or rough.spectrum != "gaussian":
-        raise ValueError(
+        raise NoBound(
             f"objects.{wall} is no plate of Gaussian roughness, whose echo this bound is for; "
             "give it kind = plate and roughness with spectrum = gaussian"
         )
     if isinstance(scenario_materials(scenario)[wall], Absorber) or not rough.rms > 0:
-        raise ValueError(f"objects.{wall} has no diffuse echo: smooth, or an absorber")
+        raise NoBound(f"objects.{wall} has no diffuse echo: smooth, or an absorber")
     positions, frequencies = scenario.base_station.element_positions, scenario.radio.frequencies
     wavelength = speed_of_light / float(frequencies.mean())
     start, end = plate_segment(body)

@@ -183,7 +183,7 @@ def calibration(effort: Effort, tell: Tell) -> Finding:
                     unit="%",
                     low=90.0,
                     high=98.0,
-                    origin="the issue's bound; 200 trials scatter by 1.5 %",
+                    origin="three deviations of a share of 200 trials (1.5 %) below, two above",
                 )
             )
 

@@ -263,11 +263,11 @@ def room(effort: Effort, tell: Tell) -> Finding:
     rows = [
         Row(
             name=f"{user}: position",
-            stated="within 5 mm",
+            stated="within a wavelength",
             measured=1e3 * (found.user_error(user) or float("inf")),
             unit="mm",
             high=5.0,
-            origin="the issue's bound",
+            origin="the wavelength at 60 GHz, a ninth of the range cell c/B",
         )
         for user in found.truth.user_position
     ]

@@ -6,11 +6,11 @@ on two cores, with ``--quick`` one. The numbers go to a CSV file beside the figu
 Not in the thesis, which states no bound. Chosen:
 
 - *Free space*: the closed-form pilot of :mod:`validation.analytic.point_scatterer`, direct (70°)
-and over
-  one known mirror of 45° (image at 80°); 64 elements of 0.5 mm, 220 to 295 GHz in steps of
+and
+  over one known mirror of 45° (image at 80°); 64 elements of 0.5 mm, 220 to 295 GHz in steps of
   0.25 GHz, 0.6 m of path, 10 dB per channel sample; of SNR, bandwidth, aperture and distance one
   is swept.
-  Whoever is measured knows nothing: the estimator's path search starts from the whole map.
+  Whoever is measured knows nothing: the path search of `locate` starts from the whole map.
 - *Rough wall*: ``slam_2d`` at half its size (128 elements, 401 frequencies, a wall of 20 cm 0.4 m
   away; fewer frequencies do not image its far end at 0.48 m unambiguously, and the bound counts
   on all of the wall), roughness and noise drawn anew for each trial. With the wall known the
@@ -39,8 +39,14 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from estimator.channel.relax import extract_paths
+from estimator.channel.angle_range_map_2d import (
+    angle_range_map,
+    default_angles,
+    default_path_lengths,
+)
+from estimator.channel.path_extraction_2d import find_paths
 from estimator.localization.pipeline import locate
+from estimator.localization.stages_2d import MAP_SAMPLES
 from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
@@ -306,11 +312,22 @@ def _compared(
 def _path_error(
     pilot: Uplink, user: Float[np.ndarray, " 3"], planes: Sequence[Plane]
 ) -> float | None:
-    """Take a pilot's strongest path, fold it, and compare; None if none stands out of the noise."""
-    paths = extract_paths(pilot, most=1)
+    """Take a pilot's strongest path, fold it, and compare; None if none stands out of the noise.
+
+    The path is the one that :func:`estimator.localization.locate.locate` finds: the same map of
+    the same angles and lengths, the same search, the same fit. The wall alone is given.
+    """
+    looked = angle_range_map(
+        pilot,
+        aoa=default_angles(pilot, cells=MAP_SAMPLES),
+        path_length=default_path_lengths(pilot, cells=MAP_SAMPLES),
+        centre=np.zeros(3),
+    )
+    paths = find_paths(pilot, looked).paths
     if not paths:
         return None
-    found = paths[0].path_length * np.array([np.cos(paths[0].aoa), np.sin(paths[0].aoa), 0.0])
+    wave = paths[0].wave
+    found = wave.path_length * np.array([np.cos(wave.aoa), np.sin(wave.aoa), 0.0])
     for plane in planes:
         found = _folded(found, plane)
     return float(np.linalg.norm(found - user))

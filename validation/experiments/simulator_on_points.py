@@ -39,9 +39,14 @@ from validation.harness.row_table import conclude_with_figure
 from validation.metrics.point_response import peak_cut
 
 CELLS_OFF = 0.05
+"""Farthest peak off its point, over the range cell: noise moves it by 0.04 of a cell where the
+focused point stands 20 dB out of it, √12/(2π√(2·SNR)) after Cramér-Rao. [-]"""
 WIDTHS_WITHIN = 0.05
+"""Largest relative error of -3 dB widths: the formulas are of a narrow band, that is 29 %. [-]"""
 PHASE_DEG = 5.0
+"""Largest error of phase: noise turns one sample at 20 dB by 1/√(2·SNR), 4°. [°]"""
 LEVEL_DB = 0.2
+"""Largest error of level: a third of what noise changes one sample at 20 dB by. [dB]"""
 SIMULATOR_WITHIN = 1e-9
 """Largest error of a simulated channel over the largest sample: double precision (1e-16) of phases
 of 2e3 turns, with room for their summation. [-]"""
@@ -278,7 +283,7 @@ def rows(results: PointResults) -> tuple[Row, ...]:
                 stated="closed form: at the point",
                 measured=max(image.cells_off for image in images),
                 high=CELLS_OFF,
-                origin="the cell's twentieth, the issue's bound",
+                origin="noise at 20 dB after focusing moves a peak by 0.04 cells (Cramér-Rao)",
             ),
             Row(
                 name=f"-3 dB widths, {points}",
@@ -296,7 +301,7 @@ def rows(results: PointResults) -> tuple[Row, ...]:
                 measured=float(np.degrees(max(abs(image.phase_error) for image in images))),
                 unit="°",
                 high=PHASE_DEG,
-                origin="the issue's bound",
+                origin="noise turns one sample at 20 dB by 4°",
             ),
             Row(
                 name=f"level at the point, {points}",
@@ -305,7 +310,7 @@ def rows(results: PointResults) -> tuple[Row, ...]:
                 unit="dB",
                 low=-LEVEL_DB,
                 high=LEVEL_DB,
-                origin="the issue's bound",
+                origin="noise changes one sample at 20 dB by 0.6 dB, three times as much",
             ),
         ]
     table += [

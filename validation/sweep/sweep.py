@@ -25,6 +25,7 @@ from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from simulator.dataset.task_runner import Result, Task, Workers, work_off
 from simulator.scene.truth import scenario_truth
+from validation.bounds.no_bound import NoBound
 from validation.bounds.roughness_floor import roughness_floor
 from validation.bounds.scenario_bound import scenario_position_bound, user_waves
 from validation.bounds.wall_bound import wall_covariance_bound
@@ -330,19 +331,19 @@ def position_bounds(scenario: Scenario, user: str) -> tuple[float | None, float 
     """
     try:
         known = scenario_position_bound(scenario, user).deviation
-    except ValueError:  # no noise, or nothing that fixes the position
+    except NoBound:  # no noise, or nothing that fixes the position
         return None, None
     covariance = {}
     for name, body in scenario.objects.items():
         if isinstance(body, Plate) and body.material != "absorber":
             try:
                 covariance[name] = wall_covariance_bound(scenario, name)
-            except ValueError:  # smooth, or in space: its echo has no such closed form
+            except NoBound:  # smooth, or in space: its echo has no such closed form
                 return known, None
     try:
         told = scenario_position_bound(scenario, user, wall_covariance=covariance).deviation
         return known, float(np.hypot(told, _bent(scenario, user)))
-    except ValueError:  # a wall that no path meets, or a scene in space
+    except NoBound:  # the walls are too uncertain, or the scene in space
         return known, None
 
 

@@ -167,9 +167,11 @@ def test_users_need_an_array() -> None:
         scenario({"receivers": ARC}, users={"ann": {"position_m": [1.0, 1.0]}})
 
 
-def test_two_dimensions_take_one_bounce_between_antennas_apart() -> None:
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_antennas_apart_take_one_bounce(dimensions: int) -> None:
+    objects = {"plate": {**PLATE, **({"height_m": 0.1} if dimensions == 3 else {})}}
     with pytest.raises(ScenarioError, match=r"^max_bounces = 2: with transmitter and receiver ap"):
-        scenario({"receivers": ARC}, max_bounces=2)
+        scenario({"receivers": ARC}, dimensions=dimensions, objects=objects, max_bounces=2)
 
 
 def test_the_centre_is_the_arrays_or_the_mean_of_the_receivers() -> None:
