@@ -55,7 +55,8 @@ def thermal_noise(
             f"the noise is set to {snr_db} dB below the signal, but the signal's mean power is "
             f"{power}: nothing reaches the antennas; open a path or remove the noise"
         )
-    return samples + complex_noise(samples.shape, power / 10 ** (snr_db / 10), rng)
+    noise = complex_noise(samples.shape, power / 10 ** (snr_db / 10), rng)
+    return np.asarray(samples + noise)
 
 
 def phase_noise(

@@ -142,9 +142,3 @@ def plane_wave_angle(pilot: Uplink) -> float:
         options={"xatol": 1e-8},
     )
     return float(np.arccos(found.x))
-
-
-def array_axis_angle(pilot: Uplink) -> float:
-    """Return the azimuth of an array's axis from +x [rad]."""
-    axis = pilot.positions[-1] - pilot.positions[0]
-    return float(np.arctan2(axis[1], axis[0]))

@@ -11,30 +11,12 @@ With the power :math:`w_{mn} = |u_{mn}|^2` and the phases' slopes :math:`\psi_i 
 .. math:: F_{ij} = \frac{2}{\sigma^2} \left[ \sum w \psi_i \psi_j
           - \frac{(\sum w \psi_i)(\sum w \psi_j)}{\sum w} \right] .
 
-The amplitudes' own dependence on the parameters adds a share of 1/(kR)² and is left out;
-:func:`numerical_fisher` keeps it, and knows nothing of these formulas.
+The amplitudes' own dependence on the parameters adds a share of 1/(kR)² and is left out.
 """
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 from scipy.constants import speed_of_light
-
-
-def spherical_wave(
-    parameters: Float[np.ndarray, " 4"],
-    positions: Float[np.ndarray, "elements 3"],
-    frequencies: Float[np.ndarray, " freqs"],
-) -> Complex[np.ndarray, "elements freqs"]:
-    """Evaluate the model for (angle [rad], path length [m], Re g, Im g).
-
-    Angles are from +x in the plane z = 0, lengths from the origin.
-    """
-    aoa, path_length, re, im = parameters
-    source = path_length * np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    distance = np.linalg.norm(source - positions, axis=1)
-    turns = np.outer(distance, frequencies / speed_of_light)
-    wave = (path_length / distance)[:, None] * np.exp(-2j * np.pi * turns)
-    return np.asarray((re + 1j * im) * wave)
 
 
 def cramer_rao_bound(
@@ -79,46 +61,3 @@ def cramer_rao_bound(
     centred = slopes - means[:, None, None]
     information = 2 * np.einsum("mn,imn,jmn->ij", power, centred, centred)
     return np.asarray(np.linalg.inv(information))
-
-
-def numerical_fisher(
-    parameters: Float[np.ndarray, " 4"],
-    *,
-    noise_variance: float,
-    positions: Float[np.ndarray, "elements 3"],
-    frequencies: Float[np.ndarray, " freqs"],
-) -> Float[np.ndarray, "4 4"]:
-    """Return the Fisher information of the whole model by central differences.
-
-    Parameters
-    ----------
-    parameters
-        Angle [rad], path length [m], real and imaginary part of the gain.
-    noise_variance
-        Per complex sample. [-]
-    positions, frequencies
-        Elements [m] and sweep [Hz].
-    """
-    wavenumber = 2 * np.pi * float(frequencies[-1]) / speed_of_light
-    size = float(np.abs(parameters[2] + 1j * parameters[3]))
-    reach = float(np.abs(positions).max())
-    # Steps that turn no phase by more than 1e-3: the differences err by a part in 1e6.
-    steps = np.array([1e-3 / (wavenumber * reach), 1e-3 / wavenumber, 1e-4 * size, 1e-4 * size])
-    slopes = []
-    for index, step in enumerate(steps):
-        move = np.zeros(4)
-        move[index] = step
-        ahead = spherical_wave(parameters + move, positions, frequencies)
-        behind = spherical_wave(parameters - move, positions, frequencies)
-        slopes.append((ahead - behind).ravel() / (2 * step))
-    jacobian = np.stack(slopes)
-    return np.asarray(2 / noise_variance * (jacobian.conj() @ jacobian.T).real)
-
-
-def broadside_range_bound(*, bandwidth: float, samples: int, snr: float) -> float:
-    """Return the textbook bound of the range's deviation for a distant source, in metres.
-
-    c / (2π B/√12 √(2 MN SNR)), for a uniform sweep of bandwidth B in hertz.
-    """
-    rms_bandwidth = bandwidth / np.sqrt(12)
-    return float(speed_of_light / (2 * np.pi * rms_bandwidth * np.sqrt(2 * samples * snr)))

@@ -26,7 +26,7 @@ from estimator.results.estimate import Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.harness.claim import Tell
-from validation.metrics.coverage import coverage, normalised_square
+from validation.metrics.coverage import consistency, coverage, normalised_square
 from validation.metrics.truth import Truth, truth_from_dataset
 
 TRIALS = 200
@@ -147,9 +147,11 @@ def table_row(name: str, result: Calibration) -> str:
     """Describe one variant in a line."""
     errors = 1e3 * result.errors
     held = coverage(result.squares, probability=0.95, axes=2)
+    mean = consistency(result.squares, axes=2)
     return (
         f"{name:8s} found {result.found}/{result.trials}; mean of e'C⁻¹e "
-        f"{result.squares.mean():.2f} (2 expected); 95 % region holds "
+        f"{mean.mean:.2f} (2 expected, {mean.low:.2f} to {mean.high:.2f} by scatter); "
+        f"95 % region holds "
         f"{100 * held.share:.1f} % (true share {100 * held.low:.1f} to {100 * held.high:.1f} %), "
         f"99.9 % region {100 * result.held(0.999):.1f} %; "
         f"error median {np.median(errors):.4f}, worst {errors.max():.4f} mm; wall: mean "

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from estimator.results.estimate import DirectionMap, Estimate, Image, UserEstimate
 from validation.figures import figures_2d
 
-AXES = ("x", "y", "z")
 LABELS = ("x, along the array [m]", "y, boresight [m]", "z, up [m]")
 
 
