@@ -28,6 +28,9 @@ from validation.metrics.truth import read_truth
 Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
 """Where each user truly is at each time; empty where it is not known."""
 
+LEAST_RIVAL = 0.01
+"""Probability below which another choice is not told: one in a hundred tracks. [-]"""
+
 
 def track(
     measurements: str | Path | Sequence[model.Measurement],
@@ -190,7 +193,7 @@ def track_lines(document: Mapping[str, Any], folder: Path) -> Iterator[str]:
         points = {point["time_s"]: point for point in one["points"]}
         for fix in one["fixes"]:
             yield f"{one['name']} at {fix['time_s']:.3f} s: {_told(fix, points.get(fix['time_s']))}"
-        if one["rival"] > 0.01:
+        if one["rival"] > LEAST_RIVAL:
             yield (
                 f"{one['name']}: another choice among ambiguous answers is "
                 f"{100 * one['rival']:.0f} % as probable"

@@ -22,6 +22,14 @@ Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1, max_length
 
 _MOST_TRIES = 10_000  # of a truncated normal distribution; it keeps at least 1 % (see below)
 
+LEAST_KEPT = 0.01
+"""Share of a truncated distribution that its limits must keep: draws are repeated until one is
+within them, a hundred times on average at most. [-]"""
+
+LEAST_FILLED = 1e-3
+"""Share of the box around a polygon that must be inside: points are drawn in the box until one is,
+a thousand times on average at most. [-]"""
+
 
 class Uniform(Checked):
     """Any number of a range, all alike."""
@@ -112,7 +120,7 @@ class Normal(Checked):
         kept = (self.mean + self.deviation * steps >= low) & (
             self.mean + self.deviation * steps <= high
         )
-        if density[kept].sum() < 0.01 * density.sum():
+        if density[kept].sum() < LEAST_KEPT * density.sum():
             raise PydanticCustomError(
                 "range",
                 "low and high keep less than 1 % of the distribution; widen them, or use a "
@@ -234,8 +242,7 @@ class InPolygon(Checked):
             _check_range(self.low_z_m, self.high_z_m)
         corners = self._plan
         size = np.ptp(corners, axis=0).prod()
-        # Of a random point of the box around it, at least one in a thousand must be inside.
-        if abs(_signed_area(corners)) < 1e-3 * size or size == 0:
+        if abs(_signed_area(corners)) < LEAST_FILLED * size or size == 0:
             raise PydanticCustomError(
                 "polygon", "the corners enclose (almost) nothing; give them in order around it"
             )

@@ -21,6 +21,7 @@ LONGEST_SPACING = 1e4
 """Longest distance of neighbouring elements [mm]."""
 
 _SHORTEST_SPACING = 1e-3
+"""Shortest distance of neighbouring elements, a thousandth of λ at 300 GHz [mm]."""
 
 
 def _one_or_two(value: object, *, whole: bool, low: float, high: float) -> list[int | float]:

@@ -8,6 +8,10 @@ from jaxtyping import Float
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas.field_pattern import field_gain, horn_beam_sigma
 
+ABRUPT = 0.05
+"""Angle before the edge of the half space where a cosine's pattern is taken to end abruptly: there
+its logarithm falls by 1/0.05 for each radian and power, a nearly empty field. [rad]"""
+
 
 @dataclass(frozen=True, eq=False)
 class AntennaPattern:
@@ -75,8 +79,8 @@ class AntennaPattern:
         if isinstance(self.antenna, Isotropic):
             return np.zeros_like(angles)
         if isinstance(self.antenna, Cosine):  # at the edge of the half space it ends abruptly
-            abrupt = np.where(angles < np.pi / 2 - 0.05, 0.0, np.inf)
-            return np.asarray(self.power * np.tan(np.minimum(angles, np.pi / 2 - 1e-6)) + abrupt)
+            abrupt = np.where(angles < np.pi / 2 - ABRUPT, 0.0, np.inf)
+            return np.asarray(self.power * np.tan(np.minimum(angles, np.pi / 2 - ABRUPT)) + abrupt)
         return angles / self.width**2
 
 

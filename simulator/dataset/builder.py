@@ -43,6 +43,9 @@ from simulator.dataset.variables import FAILED
 Tally = Callable[[int, int, int], None]
 """Told how many samples are done (the failed ones included), have failed, and there are in all."""
 
+COMPILING = 10.0
+"""Time of a first sample up to which the compilation of kernels (some seconds) may matter. [s]"""
+
 MOST_FAILURES_TOLD = 100
 
 
@@ -172,7 +175,7 @@ def forecast(job: DatasetJob) -> Forecast:
     space = job.space
     compute_in_one_thread()
     row, seconds = _timed(space, layout)
-    if seconds < 10.0:  # the first one has also compiled the kernels
+    if seconds < COMPILING:  # the first one has also compiled the kernels
         row, seconds = _timed(space, layout)
     packed = 0
     for variable in layout.variables:

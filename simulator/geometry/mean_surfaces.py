@@ -13,6 +13,7 @@ MOST_FACES = 64
 """A mesh of more faces counts as curved, and is no mirror: chains grow as a power of them."""
 
 _SAME_PLANE = 1e-9  # how far apart the two triangles of a rectangle lie at most [m]
+_SAME_NORMAL = 1e-12  # 1 - cosine of their normals at most: 1.4 µrad, and rounding is 1e-16 [-]
 
 
 def mean_surfaces(scenario: Scenario) -> list[Surface]:
@@ -98,7 +99,7 @@ def _quadrilaterals(
         same = [
             k
             for k, height in zip(left, offset, strict=True)
-            if abs(height) < _SAME_PLANE and across[first] @ across[k] > 1 - 1e-12
+            if abs(height) < _SAME_PLANE and across[first] @ across[k] > 1 - _SAME_NORMAL
         ]
         second = same[0]
         left.remove(second)

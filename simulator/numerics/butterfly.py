@@ -41,6 +41,10 @@ AMPLITUDE_POINTS = 2
 """Points that spreading and directions ask for beyond those of the phase; with a distance of
 :data:`NEAREST` and more they err by less than :data:`LINK_ACCURACY`."""
 
+FLAT = 0.05
+"""Half a box's size across, over that along, up to which spreading and directions are taken not to
+vary across it: they vary by the size over the distance, a 60th at :data:`NEAREST`. [-]"""
+
 LARGEST_RANK = 0.7
 """Points of a block, over its facets, beyond which nothing would be saved. [-]"""
 
@@ -311,7 +315,7 @@ def _point_counts(
             turned = np.abs((towards - middle) @ box.axes.T).max(axis=(0, 1))
             phases = np.maximum(phases, wavenumber * box.half * turned)
         # Across a nearly flat box spreading and directions do not vary.
-        more = AMPLITUDE_POINTS * (box.half > 0.05 * box.half.max())
+        more = AMPLITUDE_POINTS * (box.half > FLAT * box.half.max())
         first, second = (
             _nodes_for(float(phase)) + int(extra) for phase, extra in zip(phases, more, strict=True)
         )

@@ -27,6 +27,10 @@ VERTICAL = np.array([0.0, 0.0, 1.0])
 SAMPLES_AT_ONCE = 1_000_000
 """Paths times frequencies that are evaluated in one go: 16 MB for each complex quantity."""
 
+PARALLEL = 1e-9
+"""Angle below which two directions are one: what is left across them is rounding (1e-16 of either,
+a ten-millionth of this). [rad]"""
+
 Gain = Callable[[Float[np.ndarray, "paths 3"]], Float[np.ndarray, " paths"]]
 """Field pattern of an antenna over unit directions outward from it."""
 
@@ -153,7 +157,7 @@ def transverse(
     """
     part = axis - dot(directions, axis)[:, None] * directions
     length = np.linalg.norm(part, axis=-1, keepdims=True)
-    unit: np.ndarray = np.divide(part, length, out=np.zeros_like(part), where=length > 1e-9)
+    unit: np.ndarray = np.divide(part, length, out=np.zeros_like(part), where=length > PARALLEL)
     return unit
 
 
@@ -165,8 +169,8 @@ def _across(
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     substitute = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     substitute /= np.linalg.norm(substitute)
-    # Below 1e-9 rad the cross product has lost its direction, and none is needed: TE is TM.
-    return np.where(length > 1e-9, across / np.maximum(length, 1e-9), substitute)
+    # Below that the cross product has lost its direction, and none is needed: TE is TM.
+    return np.where(length > PARALLEL, across / np.maximum(length, PARALLEL), substitute)
 
 
 def _project(

@@ -33,6 +33,10 @@ MARGIN = 6.0
 GAP = 1e-5
 """Least distance between a shaft and what does not touch it: rounding, and more. [m]"""
 
+PARALLEL = 1e-6
+"""Angle between a shaft and an edge below which they span no plane that could separate: then none
+is tried, and a ray is traced. [rad]"""
+
 RAYS_AT_ONCE = 2**26
 """Rays of which the answers are kept at one time: 64 MiB. [-]"""
 
@@ -143,7 +147,7 @@ def clear_shafts(
         for edge in (*obstacle.edges, *np.eye(3)):
             across = np.cross(along[left], edge)
             length = np.linalg.norm(across, axis=-1, keepdims=True)
-            across = np.divide(across, length, out=np.zeros_like(across), where=length > 1e-6)
+            across = np.divide(across, length, out=np.zeros_like(across), where=length > PARALLEL)
             apart |= _separated(across, ends, centres[left], radii[left], obstacle)
         clear[left] = apart
     return clear
