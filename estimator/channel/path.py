@@ -76,7 +76,7 @@ class Path:
         return 1 / max(self.free.curvature, 1 / FARTHEST)
 
     @property
-    def unfolded(self) -> float | None:
+    def dealiased_length(self) -> float | None:
         """A path length beyond the unambiguous one that fits the curvature, if one does. [m]."""
         longer = [self.free.path_length + turns * self.unambiguous for turns in (1, 2, 3)]
         nearest = min(longer, key=lambda length: abs(1 / length - self.free.curvature))

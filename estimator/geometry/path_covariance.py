@@ -75,7 +75,7 @@ def rests_on(
 def _place_by_walls(
     user: Float[np.ndarray, " 3"], walls: Sequence[Wall], over: Chain
 ) -> Float[np.ndarray, "2 parameters"]:
-    """Differentiate the place of a ghost that is folded over a chain by all walls."""
+    """Differentiate the place of a ghost that is unfolded over a chain by all walls."""
     ghost = image_over(user, walls, over)
 
     return _by_walls(lambda moved: unfolded_over(ghost, moved, over), walls, over)

@@ -1,4 +1,4 @@
-"""Projection: launch a ray along a bearing and fold it at each mirror that it meets."""
+"""Projection: launch a ray along a bearing and reflect it at each mirror that it meets."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

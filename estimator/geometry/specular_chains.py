@@ -75,7 +75,7 @@ def unfolded(
     deepest
         Most mirrors that are followed.
     skin
-        How far behind a wall a ray must go on to be folded there: what is less far is the wall's
+        How far behind a wall a ray must go on to be unfolded there: what is less far is the wall's
         own image. [m]
 
     Returns

@@ -59,7 +59,7 @@ def joint_covariance(
                     cast(SomeWall, one.moved(step if k == i else 0 * step))  # a wall stays one
                     for k, one in enumerate(seen)
                 ]
-                again = _refolded(shifted, chains, reflected)
+                again = _unfolded_again(shifted, chains, reflected)
                 moves.append(
                     np.concatenate([change(*both) for both in zip(again, walls, strict=True)])
                 )
@@ -68,7 +68,7 @@ def joint_covariance(
     return joint
 
 
-def _refolded(
+def _unfolded_again(
     seen: Sequence[SomeWall],
     chains: Sequence[Chain],
     reflected: Callable[[SomeWall, SomeWall], SomeWall],

@@ -1,4 +1,4 @@
-"""Ghost correction: what the image shows behind mirrors is folded back to its true place."""
+"""Ghost correction: what the image shows behind mirrors is unfolded to its true place."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from estimator.imaging.focusing import Focus
 
 
 @dataclass(frozen=True, kw_only=True)
-class Folded:
+class Unfolded:
     """Complex amplitudes at true places, and over which mirrors each was seen."""
 
     values: Complex[np.ndarray, "*grid"]
@@ -28,7 +28,7 @@ def corrected_image(
     *,
     raw: Complex[np.ndarray, "*grid"] | None = None,
     skin: float = 0.0,
-) -> Folded:
+) -> Unfolded:
     """Focus the echo on points where things really are.
 
     The raw image shows a point at its image over each chain of mirrors over which the array (at
@@ -66,4 +66,6 @@ def corrected_image(
         source[seen[brighter]] = len(shown_over)
         shown_over.append(chain)
     grid = points.shape[:-1]
-    return Folded(values=values.reshape(grid), chains=tuple(shown_over), chain=source.reshape(grid))
+    return Unfolded(
+        values=values.reshape(grid), chains=tuple(shown_over), chain=source.reshape(grid)
+    )

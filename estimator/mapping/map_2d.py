@@ -10,7 +10,7 @@ from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import Wall
 from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.target_detection import find_targets
-from estimator.mapping.wall_unfolding import fold_seen_lines
+from estimator.mapping.wall_unfolding import unfold_seen_lines
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.fitted_line import FittedLine
@@ -26,7 +26,7 @@ class RoomMap:
     walls: tuple[Wall, ...]  # the same at their true place
     seen_through: tuple[tuple[int, ...], ...]  # indices of walls, from the array outward
     joint_covariance: Float[np.ndarray, "parameters parameters"]
-    """Of all walls' (angle [rad], offset [m]), one wall after the other: walls that are folded
+    """Of all walls' (angle [rad], offset [m]), one wall after the other: walls that are unfolded
     about the same mirror err together."""
     targets: tuple[Target, ...]  # what is no mirror, at its true place
     unassigned_peaks: Float[
@@ -50,14 +50,14 @@ def build_room_map(echo: Echo) -> RoomMap:
     looked = survey(echo)
     found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
     resolution = echo_resolution(echo)
-    folded = fold_seen_lines(found, resolution)
+    unfolded = unfold_seen_lines(found, resolution)
     aperture = float(np.ptp(echo.positions[:, 0]))
     return RoomMap(
-        lines=folded.lines,
-        walls=folded.walls,
-        seen_through=folded.seen_through,
-        joint_covariance=folded.covariance,
-        targets=find_targets(looked, folded, found, resolution, aperture),
+        lines=unfolded.lines,
+        walls=unfolded.walls,
+        seen_through=unfolded.seen_through,
+        joint_covariance=unfolded.covariance,
+        targets=find_targets(looked, unfolded, found, resolution, aperture),
         unassigned_peaks=unassigned_peaks(echo, looked, found),
         survey=looked,
     )

@@ -1,4 +1,4 @@
-"""The map of a room in space: planes and targets at their true place, ghosts folded back."""
+"""The map of a room in space: planes and targets at their true place, ghosts unfolded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     """
     looked = survey_volume(echo, array)
     coarse = coarse_resolution(planar_resolution(array, echo))
-    planes, walls, seen = fold_planes(detect_planes(echo, array, looked).fitted, coarse)
+    planes, walls, seen = unfold_planes(detect_planes(echo, array, looked).fitted, coarse)
     joint = joint_covariance(
         [plane.wall for plane in planes], seen, walls, reflected=mirrored_wall, change=plane_change
     )
@@ -118,10 +118,10 @@ def peaks_aside(
     return unassigned_peaks(peaks, room.planes, coarse)
 
 
-def fold_planes(
+def unfold_planes(
     planes: Sequence[FittedPlane], resolution: Resolution
 ) -> tuple[tuple[FittedPlane, ...], tuple[PlaneWall, ...], tuple[tuple[int, ...], ...]]:
-    """Fold planes that are seen through others.
+    """Unfold planes that are seen through others.
 
     Parameters
     ----------
@@ -143,16 +143,16 @@ def fold_planes(
     ordered, walls = list(direct), [plane.wall for plane in direct]
     seen: list[Chain] = [()] * len(direct)
     hidden = [plane for plane in planes if not any(plane is other for other in direct)]
-    # A wall that others are seen over is nearer than they are: it is folded before them.
+    # A wall that others are seen over is nearer than they are: it is unfolded before them.
     for plane in sorted(hidden, key=lambda one: float(np.linalg.norm(one.wall.centre))):
         chain = chain_to(plane.wall.centre, walls)
-        folded = plane.wall
+        unfolded = plane.wall
         for index in chain:
-            folded = mirrored_wall(folded, walls[index])
-        if not chain or any(_coincide(folded, wall, resolution) for wall in walls):
+            unfolded = mirrored_wall(unfolded, walls[index])
+        if not chain or any(_coincide(unfolded, wall, resolution) for wall in walls):
             continue  # hidden by a ghost alone, or a known wall, seen once more
         ordered.append(plane)
-        walls.append(folded)
+        walls.append(unfolded)
         seen.append(chain)
     return tuple(ordered), tuple(walls), tuple(seen)
 
@@ -199,7 +199,7 @@ def _targets(
     planes: Sequence[PlaneWall],
     walls: Sequence[PlaneWall],
 ) -> tuple[SpaceTarget, ...]:
-    """Gather the bright voxels off the walls into clusters and fold those behind walls."""
+    """Gather the bright voxels off the walls into clusters and unfold those behind walls."""
     resolution = coarse_resolution(planar_resolution(array, echo))
     intensity = np.abs(looked.values) ** 2
     ranges, along, up = np.meshgrid(looked.ranges, looked.along, looked.up, indexing="ij")

@@ -35,8 +35,8 @@ def images_on(
     """
     points = frame.to_local(grid.points)
     raw = Image(values=focus(points), grid=grid)
-    folded = corrected_image(focus, points, walls, chains, raw=raw.values, skin=skin)
+    unfolded = corrected_image(focus, points, walls, chains, raw=raw.values, skin=skin)
     corrected = CorrectedImage(
-        values=folded.values, grid=grid, chains=folded.chains, chain=folded.chain
+        values=unfolded.values, grid=grid, chains=unfolded.chains, chain=unfolded.chain
     )
     return raw, corrected

@@ -22,7 +22,7 @@ from estimator.geometry.wall_covariance import place_covariance
 from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.survey_2d import Survey
 from estimator.mapping.diffuse_multipath import between, in_cloud
-from estimator.mapping.wall_unfolding import FoldedWalls
+from estimator.mapping.wall_unfolding import UnfoldedWalls
 from estimator.results.estimate import Target
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_relations import BEYOND_END, lies_on
@@ -73,7 +73,7 @@ class Spot:
 
 def find_targets(
     looked: Survey,
-    folded: FoldedWalls,
+    unfolding: UnfoldedWalls,
     found: Sequence[FittedLine],
     resolution: Resolution,
     aperture: float,
@@ -84,7 +84,7 @@ def find_targets(
     ----------
     looked
         The image and its peaks.
-    folded
+    unfolding
         The walls.
     found
         All lines of the image, also those that are another view of a wall.
@@ -109,8 +109,8 @@ def find_targets(
         if not any(lies_on(peak, line, coarse, margin=BEYOND_END) for line in found)
     ]
     faces = [
-        _face(index, folded)
-        for index, wall in enumerate(folded.walls)
+        _face(index, unfolding)
+        for index, wall in enumerate(unfolding.walls)
         if np.linalg.norm(wall.end - wall.start) < aperture
     ]
     targets: list[Target] = []
@@ -123,12 +123,12 @@ def find_targets(
         ):
             continue
         kept.append(spot)
-        target = _target(spot, folded, resolution)
+        target = _target(spot, unfolding, resolution)
         if _is_late(target, targets):
             continue
-        if not _is_known(target, targets, folded.walls, coarse):
+        if not _is_known(target, targets, unfolding.walls, coarse):
             targets.append(target)
-    true = [t for t in targets if not _is_mixed(t, targets, folded.walls, coarse)]
+    true = [t for t in targets if not _is_mixed(t, targets, unfolding.walls, coarse)]
     return tuple(sorted([*faces, *true], key=lambda target: -(target.level_db or 0.0)))
 
 
@@ -278,12 +278,12 @@ def _before(line: FittedLine, point: Float[np.ndarray, " 3"]) -> bool:
     return bool(unfolded(point[None], [wall], deepest=1)[1][0, 0] == 0)
 
 
-def _target(spot: Spot, folded: FoldedWalls, resolution: Resolution) -> Target:
-    places, chains = unfolded(spot.place[None], folded.walls)
+def _target(spot: Spot, unfolding: UnfoldedWalls, resolution: Resolution) -> Target:
+    places, chains = unfolded(spot.place[None], unfolding.walls)
     chain = tuple(int(index) for index in chains[0] if index >= 0)
     ends = spot.ends
     if ends is not None:  # over the same mirrors, whatever their extent
-        ends = unfolded_over(ends, folded.walls, chain)
+        ends = unfolded_over(ends, unfolding.walls, chain)
     reach = float(np.linalg.norm(spot.place))
     ray = spot.place / reach
     across = unit_normal(np.zeros(3), spot.place)
@@ -300,15 +300,16 @@ def _target(spot: Spot, folded: FoldedWalls, resolution: Resolution) -> Target:
         position=places[0],
         ghost=spot.place,
         seen_through=chain,
-        covariance=place_covariance(spot.place, own, folded.walls, folded.covariance, chain),
+        covariance=place_covariance(spot.place, own, unfolding.walls, unfolding.covariance, chain),
         level_db=float(10 * np.log10(spot.intensity)),
         ends=ends,
     )
 
 
-def _face(index: int, folded: FoldedWalls) -> Target:
+def _face(index: int, unfolding: UnfoldedWalls) -> Target:
     """Report a short wall as the face of an object."""
-    line, wall, chain = folded.lines[index], folded.walls[index], folded.seen_through[index]
+    line, wall = unfolding.lines[index], unfolding.walls[index]
+    chain = unfolding.seen_through[index]
     return Target(
         position=0.5 * (wall.start + wall.end),
         ghost=line.middle,

@@ -1,7 +1,7 @@
 """From the lines that an image shows to walls at their true place, with their joint covariance.
 
 A line that is seen over mirrors is mirrored back about each of them. Its place then depends on
-theirs: an error of a mirror's angle turns the folded wall twice, and the errors of both are
+theirs: an error of a mirror's angle turns the unfolded wall twice, and the errors of both are
 correlated.
 """
 
@@ -22,13 +22,13 @@ from estimator.walls.fitted_line import FittedLine
 SAMPLES = 9
 """Places along a line at which it is asked what stands before them."""
 SAME_PLACE = 3.0
-"""Cells within which a folded line and a wall that is seen otherwise are one."""
+"""Cells within which an unfolded line and a wall that is seen otherwise are one."""
 MIXED_SAMPLES = 65
 """Places along a wall whose two views are mixed: closer than the cells of the mixture."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class FoldedWalls:
+class UnfoldedWalls:
     """Walls at their true place; those seen directly first, the strongest first."""
 
     lines: tuple[FittedLine, ...]  # as the image shows them
@@ -41,8 +41,8 @@ class FoldedWalls:
     as another view of a wall."""
 
 
-def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
-    """Fold each line over the mirrors that the array sees it through.
+def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> UnfoldedWalls:
+    """Unfold each line over the mirrors that the array sees it through.
 
     Parameters
     ----------
@@ -61,13 +61,14 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
     views: list[tuple[FittedLine, Wall]] = []
     for line in _from_the_array_outward(lines):
         chain = _chain_before(line, walls)
-        folded = _folded(line, walls, chain)
+        unfolding = _unfolded(line, walls, chain)
         if chain:
-            views.append((line, folded))
-        if len(chain) == LONGEST_CHAIN or any(_is_one(line, folded, w, resolution) for w in walls):
+            views.append((line, unfolding))
+        same = any(_is_one(line, unfolding, wall, resolution) for wall in walls)
+        if len(chain) == LONGEST_CHAIN or same:
             continue
         kept.append(line)
-        walls.append(folded)
+        walls.append(unfolding)
         seen.append(chain)
     order = sorted(range(len(kept)), key=lambda i: (len(seen[i]), -kept[i].level))
     place = {old: new for new, old in enumerate(order)}
@@ -78,7 +79,7 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
         Wall(start=line.start, end=line.end, covariance=line.covariance) for line in lines
     ]
     joint = joint_covariance(seen_walls, chains, nominal, reflected=_reflected, change=_change)
-    return FoldedWalls(
+    return UnfoldedWalls(
         lines=lines,
         walls=tuple(
             replace(wall, covariance=joint[2 * i : 2 * i + 2, 2 * i : 2 * i + 2])
@@ -90,21 +91,21 @@ def fold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWal
     )
 
 
-def fold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> FoldedWalls:
-    """Fold lines as :func:`fold_lines` does, without those that are two views of a wall mixed.
+def unfold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> UnfoldedWalls:
+    """Unfold lines as :func:`unfold_lines` does, without those that are two views of a wall mixed.
 
     What goes out over a mirror and comes back directly shows a wall that is seen both ways a third
     time, halfway between the two views, as sharply as they are.
     """
-    folded = fold_lines(lines, resolution)
-    seen = [line for line in lines if not _is_mixed(line, folded, resolution)]
-    return folded if len(seen) == len(lines) else fold_lines(seen, resolution)
+    unfolding = unfold_lines(lines, resolution)
+    seen = [line for line in lines if not _is_mixed(line, unfolding, resolution)]
+    return unfolding if len(seen) == len(lines) else unfold_lines(seen, resolution)
 
 
-def _is_mixed(line: FittedLine, folded: FoldedWalls, resolution: Resolution) -> bool:
+def _is_mixed(line: FittedLine, unfolding: UnfoldedWalls, resolution: Resolution) -> bool:
     """Tell whether most of a line is halfway between another's place and its wall's."""
     points = np.linspace(line.start, line.end, SAMPLES)
-    for other, wall in folded.views:
+    for other, wall in unfolding.views:
         if other is line:
             continue
         places = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
@@ -146,17 +147,17 @@ def _chain_before(line: FittedLine, walls: Sequence[Wall]) -> Chain:
     return chains.most_common(1)[0][0]
 
 
-def _folded(line: FittedLine, walls: Sequence[Wall], chain: Chain) -> Wall:
+def _unfolded(line: FittedLine, walls: Sequence[Wall], chain: Chain) -> Wall:
     ends = np.stack([line.start, line.end])
     for index in chain:
         ends = mirrored(ends, walls[index].start, walls[index].end)
     return Wall(start=ends[0], end=ends[1], covariance=line.covariance)
 
 
-def _is_one(line: FittedLine, folded: Wall, other: Wall, resolution: Resolution) -> bool:
-    """Tell whether most of a line, once folded, lies on another wall, within a few cells."""
+def _is_one(line: FittedLine, unfolding: Wall, other: Wall, resolution: Resolution) -> bool:
+    """Tell whether most of a line, once unfolded, lies on another wall, within a few cells."""
     along = (other.end - other.start) / np.linalg.norm(other.end - other.start)
-    points = np.linspace(folded.start, folded.end, SAMPLES)
+    points = np.linspace(unfolding.start, unfolding.end, SAMPLES)
     # The cell is that of the image, where the line is farther away.
     images = np.linspace(line.start, line.end, SAMPLES)
     cells = resolution.cell(images, line.normal)

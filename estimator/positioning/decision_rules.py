@@ -157,7 +157,7 @@ def _on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
 
 def _why_none(path: Path, how: Bearing) -> str:
     where = f"{how.told(path.wave.bearing)}, {path.wave.path_length:.3f} m"
-    if (length := path.unfolded) is not None:
+    if (length := path.dealiased_length) is not None:
         return (
             f"the path at {where} has the curvature of one {length:.2f} m long, beyond the "
             f"unambiguous {path.unambiguous:.2f} m; take smaller frequency steps"
@@ -351,7 +351,7 @@ def _reports(
         reason, mirrors = None, used.get(index)
         if index not in chains:
             reason = "rounder than its delay: an edge or a rough patch scattered it"
-            if path.unfolded is not None:
+            if path.dealiased_length is not None:
                 reason = "flatter than its delay: longer than what is unambiguous"
         elif index not in used:
             mirrors = chains[index][0]

@@ -256,7 +256,7 @@ def _trace(
     chain: Chain,
     screens: _Screens,
 ) -> tuple[Float[np.ndarray, "vertices 3"], float] | None:
-    """Fold the straight line to the image back onto the mirrors; None if there is no path."""
+    """Find the bounces of the path to an image, mirror by mirror; None if there is no such path."""
     vertices, margin = [np.zeros(3)], np.inf
     for bounce, index in enumerate(chain):
         image = image_over(user, walls, chain[bounce:])

@@ -57,7 +57,7 @@ class DirectionMap:
 
 @dataclass(frozen=True, kw_only=True)
 class Mirror:
-    """A flat wall of finite extent, at its true (folded) place.
+    """A flat wall of finite extent, at its true (unfolded) place.
 
     In space ``start`` and ``end`` are the midpoints of its left and right sides, ``corners``
     go around it, and the covariance is that of (turn of the horizontal axis, turn of the axis

@@ -68,7 +68,7 @@ def run(
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a scenario, image it, fold the ghosts back, locate the users, and report.
+    """Simulate a scenario, image it, unfold the ghosts, locate the users, and report.
 
     Writes to `--out` (default `out/SCENARIO-SEED/`) the result, the measurement, the figures
     and a report. What an earlier run wrote there is replaced; a foreign folder is refused.

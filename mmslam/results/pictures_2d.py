@@ -125,7 +125,7 @@ def image_figure(
         figures_2d.overlay_paths(ax, estimate.users, width=1.2)
         figures_2d.overlay_users(ax, estimate.users)
     ax.set_title(
-        "Image with ghosts folded back" if corrected else "Raw image: walls and ghosts as seen"
+        "Image with ghosts unfolded" if corrected else "Raw image: walls and ghosts as seen"
     )
     return figure
 

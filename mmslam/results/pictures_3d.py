@@ -42,7 +42,7 @@ def volume_figure(
             users=corrected,
         )
     figure.suptitle(
-        "Brightest voxel, ghosts folded back" if corrected else "Brightest voxel, as measured"
+        "Brightest voxel, ghosts unfolded" if corrected else "Brightest voxel, as measured"
     )
     return figure
 

@@ -17,7 +17,7 @@ from scenes.scenario import Scenario
 CAPTIONS = {
     "localization.png": "Plan of what was found; the user enlarged, with its error ellipses.",
     "raw_image.png": "The image as measured, ghosts behind the mirrors included.",
-    "corrected_image.png": "The image after each ghost was folded back through its mirror.",
+    "corrected_image.png": "The image after each ghost was unfolded through its mirror.",
     "angle_range_map.png": "The user's pilot over angle of arrival and path length.",
 }
 

@@ -15,7 +15,7 @@ the interpolation of wavenumbers (Stolt); the image here is formed by back-proje
 neither. A post is said to be imaged "at its place"; an image shows its front face, one radius
 nearer to the array's image in the wall.
 
-Claims that are asserted: the mirror is found; both ghosts fold back onto front faces, within 1.5 mm
+Claims that are asserted: the mirror is found; both ghosts unfold onto front faces, within 1.5 mm
 along range and a resolution cell across; no other target is within 10 dB of the weaker one.
 """
 

@@ -13,7 +13,7 @@ over: it is imaged as a line. Its middle, as far as it is seen, is compared with
 true face that is nearest to the array's image. The estimator lists so short a face both as a target
 and, being flat, as a mirror that is seen through the wall.
 
-Claims that are asserted: the mirror is found; the face folds back to its place, within 1.5 mm along
+Claims that are asserted: the mirror is found; the face unfolds to its place, within 1.5 mm along
 range and a resolution cell across; no other target is within 10 dB of it.
 """
 

@@ -17,8 +17,8 @@ There is no quick form: at half the size the second wall is resolved half as wel
 and the claims would be others.
 
 Claims that are asserted: both walls at their true place, the second one first at its ghost's,
-behind the first, and then folded; the map's -3 dB widths are theory's; the user within 3 mm in the
-median, 5 mm at worst.
+behind the first, and then unfolded; the map's -3 dB widths are theory's; the user within 3 mm in
+the median, 5 mm at worst.
 """
 
 import sys
@@ -117,14 +117,14 @@ def draw(figure: Figure, result: LabTwoWalls) -> None:
     axes[0, 0].set_title("4.14: the set-up")
     shown = [views.estimate_points(estimate, positions), views.ghost_points(estimate)]
     view = views.view_around(np.concatenate([*shown, views.bright_points(raw)]))
-    for ax, image, folded in ((axes[0, 1], raw, False), (axes[0, 2], corrected, True)):
+    for ax, image, unfolded in ((axes[0, 1], raw, False), (axes[0, 2], corrected, True)):
         figures_2d.draw_image(ax, image, view=view, floor_db=-60.0)
         figures_2d.overlay_array(ax, positions, colour=figures_2d.ON_DARK)
-        mirrors = estimate.mirrors if folded else estimate.mirrors[:1]
+        mirrors = estimate.mirrors if unfolded else estimate.mirrors[:1]
         figures_2d.overlay_mirrors(ax, mirrors, line=False)
     axes[0, 1].set_title("4.15: raw, the second wall behind the first")
     figures_2d.overlay_paths(axes[0, 2], estimate.users, width=1.0)
-    axes[0, 2].set_title("4.15: folded")
+    axes[0, 2].set_title("4.15: unfolded")
     draw_map(axes[1, 0], trial)
     axes[1, 0].set_title(f"4.16: {axes[1, 0].get_title()}", fontsize=10)
     draw_plan(axes[1, 1], trial)

@@ -14,7 +14,7 @@ and
 - *Rough wall*: ``slam_2d`` at half its size (128 elements, 401 frequencies, a wall of 20 cm 0.4 m
   away; fewer frequencies do not image its far end at 0.48 m unambiguously, and the bound counts
   on all of the wall), roughness and noise drawn anew for each trial. With the wall known the
-  strongest path is folded over the true mean plane; with the wall estimated the whole estimator
+  strongest path is unfolded over the true mean plane; with the wall estimated the whole estimator
   answers. What it is held against is the root of the sum of squares of the bound (noise, wall
   known), of the floor of :mod:`validation.bounds.roughness_floor`, and, with the wall estimated, of
   what
@@ -201,7 +201,7 @@ def free_space(
     plane = Plane(point=0.45 * image, normal=np.array([1.0, -1.0, 0.0]) / np.sqrt(2))
     planes = [plane] if mirrored else []
     path = (0,) if mirrored else ()
-    user = _folded(image, plane) if mirrored else image
+    user = _unfolded(image, plane) if mirrored else image
     rng = np.random.default_rng([trials, elements, round(bandwidth / 1e9), round(1e3 * distance)])
     clean = point_uplink(image[None], positions=positions, frequencies=frequencies)
     snr = 10 ** (snr_db / 10)
@@ -328,9 +328,9 @@ def _compared(
 def _path_error(
     pilot: Uplink, user: Float[np.ndarray, " 3"], planes: Sequence[Plane]
 ) -> float | None:
-    """Take a pilot's strongest path, fold it, and compare; None if none stands out of the noise.
+    """Take a pilot's strongest path, unfold it, and compare; None if none stands out of the noise.
 
-    The path is the one that :func:`estimator.localization.locate.locate` finds: the same map of
+    The path is the one that :func:`estimator.localization.pipeline.locate` finds: the same map of
     the same angles and lengths, the same search, the same fit. The wall alone is given.
     """
     looked = angle_range_map(
@@ -345,11 +345,11 @@ def _path_error(
     wave = paths[0].wave
     found = wave.path_length * np.array([np.cos(wave.aoa), np.sin(wave.aoa), 0.0])
     for plane in planes:
-        found = _folded(found, plane)
+        found = _unfolded(found, plane)
     return float(np.linalg.norm(found - user))
 
 
-def _folded(point: Float[np.ndarray, " 3"], plane: Plane) -> Float[np.ndarray, " 3"]:
+def _unfolded(point: Float[np.ndarray, " 3"], plane: Plane) -> Float[np.ndarray, " 3"]:
     return image_and_slopes(point, (0,), [plane])[0]
 
 

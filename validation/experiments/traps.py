@@ -3,7 +3,7 @@
 Run as ``python -m validation.experiments.traps [SEEDS [TRAP …]]``.
 
 Not in the thesis, which knows its one wall beforehand. Each trap is a room in two dimensions
-with walls and users where a careless estimator folds a path that is direct, takes a wall for
+with walls and users where a careless estimator unfolds a path that is direct, takes a wall for
 another, a ghost for a wall, an edge for a user, or a bent wave for a mirror's. The rooms are those
 of :mod:`validation.trials.trap_rooms`.
 

@@ -92,7 +92,7 @@ def overlay_mirrors(
 
 
 def overlay_targets(ax: Axes, targets: Sequence[Target], *, colour: str = ON_DARK) -> Axes:
-    """Mark the targets at their folded places."""
+    """Mark the targets at their unfolded places."""
     for index, target in enumerate(targets):
         ax.plot(*target.position[:2], "s", mfc="none", mec=colour, ms=7, mew=1.2)
         if target.ends is not None:

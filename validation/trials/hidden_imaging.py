@@ -1,4 +1,4 @@
-"""Imaging what is seen only over a wall: the mirror, and targets folded back to where they are."""
+"""Imaging what is seen only over a wall: the mirror, and targets unfolded to where they are."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from validation.metrics.target_association import compare_targets
 from validation.metrics.truth import Truth, front_face, truth_from_dataset
 
 RANGE_LIMIT = 1.5e-3
-"""Of a folded front face along its line of sight: the null-to-peak range cell c/2B of 100 GHz,
+"""Of an unfolded front face along its line of sight: the null-to-peak range cell c/2B of 100 GHz,
 which is what the thesis calls its range resolution. [m]"""
 FALSE_DB = -10.0
 """A target that is none counts from here on, over the weakest true one: what an eye would take for
@@ -35,7 +35,7 @@ a third object in a figure. [dB]"""
 ANGLE_LIMIT = np.degrees(1e-3 / 2 / 0.6)
 """Of the mirror: it moves what stands 0.6 m behind it by 1 mm. [°]"""
 OFFSET_LIMIT = 0.5e-3
-"""Of the mirror: it moves a folded target by √2 as much along its line of sight at 45°, half of
+"""Of the mirror: it moves an unfolded target by √2 as much along its line of sight at 45°, half of
 :data:`RANGE_LIMIT`. [m]"""
 PEAK_WITHIN = 8e-3
 """Where the corrected image's peak is looked for around a true front face: two cells. [m]"""
@@ -83,7 +83,7 @@ class MeasureSeed(Protocol):
 
 
 def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging:
-    """Simulate a scenario, image and fold it, and compare with the truth.
+    """Simulate a scenario, image and unfold it, and compare with the truth.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging
 def compare_hidden(
     scenario: Scenario, measurement: Measurement, truth: Truth, *, seed: int, wall: str
 ) -> HiddenImaging:
-    """Image and fold a measurement of the scenario, and compare with the truth."""
+    """Image and unfold a measurement of the scenario, and compare with the truth."""
     estimate, echo = locate(measurement), measurement.echo
     if echo is None or not estimate.mirrors or estimate.corrected_image is None:
         raise RuntimeError(f"{scenario.name}, seed {seed}: no mirror is found in the echo")
@@ -319,4 +319,4 @@ def draw_hidden(figure: Figure, result: HiddenImaging) -> None:
     left.set_title(
         "Raw image: ghosts behind the wall (dotted: mirror images of the true outlines)", fontsize=9
     )
-    right.set_title("Ghosts folded back (lines: true outlines)", fontsize=9)
+    right.set_title("Ghosts unfolded (lines: true outlines)", fontsize=9)

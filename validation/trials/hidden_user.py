@@ -62,7 +62,7 @@ class UserTrial:
     true_length: float  # [m]
     aoa_error: float  # signed; NaN without an answer [rad]
     length_error: float  # signed [m]
-    walls: tuple[WallError | None, ...]  # of each wall on the way, folded; None: not found
+    walls: tuple[WallError | None, ...]  # of each wall on the way, unfolded; None: not found
     ghosts: tuple[WallError | None, ...]  # the same where the raw image shows them
     cuts: MapCuts
     seen: Seen | None
@@ -284,7 +284,7 @@ def wall_rows(
     known = [one for one in found if one is not None]
     missed = len(known) < len(found)
     count = f"worst of {len(trials)}" if len(trials) > 1 else "one realisation"
-    where = "as the raw image shows it" if as_seen else "folded" if index else "seen directly"
+    where = "as the raw image shows it" if as_seen else "unfolded" if index else "seen directly"
     name = f"wall {index + 1}, {where}, {count}"
     turned = np.nan if missed else max(one.angle for one in known)
     away = np.nan if missed else max((one.offset for one in known), key=abs)

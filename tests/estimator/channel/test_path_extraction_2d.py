@@ -79,7 +79,7 @@ def test_a_wave_that_an_edge_scatters_is_rounder_than_its_delay(behind: float, w
     samples = world.noisy(pilot(world, edge, extra=behind), 20.0, np.random.default_rng(3))
     path = max(waves(world, samples), key=lambda one: one.share)
     assert not path.specular
-    assert path.unfolded is None
+    assert path.dealiased_length is None
     assert path.free.radius == pytest.approx(0.15, rel=0.02)
     assert path.free.path_length == pytest.approx(0.15 + behind, abs=1e-3)
 
@@ -92,7 +92,7 @@ def test_a_wave_from_beyond_the_unambiguous_length_is_flatter_than_its_delay(
     path = max(waves(world, samples), key=lambda one: one.share)
     assert path.free.path_length == pytest.approx(length - UNAMBIGUOUS, abs=1e-3)
     assert not path.specular
-    assert path.unfolded == pytest.approx(length, abs=1e-2)
+    assert path.dealiased_length == pytest.approx(length, abs=1e-2)
 
 
 def test_noise_alone_holds_no_wave(world: Any) -> None:

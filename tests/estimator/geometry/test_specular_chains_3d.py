@@ -19,7 +19,7 @@ from estimator.geometry.specular_chains import (
 from estimator.geometry.specular_chains_3d import possible_chains
 from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.mapping.ghost_correction import corrected_image
-from estimator.mapping.map_3d import fold_planes
+from estimator.mapping.map_3d import unfold_planes
 from estimator.walls.plane_fit import FittedPlane, plane_axes
 
 
@@ -46,7 +46,7 @@ def random_walls(rng: np.random.Generator) -> list[PlaneWall]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_lines_are_folded_as_rays_that_are_followed_one_by_one(seed: int) -> None:
+def test_lines_are_unfolded_as_rays_that_are_followed_one_by_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     walls = random_walls(rng)
     points = rng.uniform([-2.0, 0.3, -1.0], [2.0, 6.0, 1.0], (300, 3))
@@ -109,16 +109,16 @@ def test_between_two_parallel_walls_there_are_chains_of_every_length_asked_for(
 def test_a_ghost_over_two_walls_comes_back_to_its_place_in_the_corrected_image(world: Any) -> None:
     image = image_over(THING, WALLS, (0, 1))
     survey = world.volume(image, 0.08, np.linspace(0.3, 5.0, 236))
-    halfway = mirrored_about(image, FIRST)  # where folding once would leave it
+    halfway = mirrored_about(image, FIRST)  # where unfolding once would leave it
     places = np.stack([THING, image, halfway])
     chains = possible_chains(WALLS)
-    folded = np.abs(corrected_image(survey.at, places, WALLS, chains, skin=0.02).values)
-    assert folded[0] == pytest.approx(abs(survey.at(image[None])[0]), rel=1e-9)
-    assert folded[0] > 0.8
-    assert folded[1:].max() == 0.0
+    unfolding = np.abs(corrected_image(survey.at, places, WALLS, chains, skin=0.02).values)
+    assert unfolding[0] == pytest.approx(abs(survey.at(image[None])[0]), rel=1e-9)
+    assert unfolding[0] > 0.8
+    assert unfolding[1:].max() == 0.0
 
 
-def test_a_wall_that_is_seen_over_two_others_is_folded_over_both() -> None:
+def test_a_wall_that_is_seen_over_two_others_is_unfolded_over_both() -> None:
     # A third wall closes the way that the second sends the view: the array sees it over both.
     third = square([1.5, 0.2, 0.0], [0.3, 1.0, 0.0], half=0.3)
 
@@ -140,7 +140,7 @@ def test_a_wall_that_is_seen_over_two_others_is_folded_over_both() -> None:
         )
 
     planes = [shown(third, (0, 1)), shown(SECOND, (0,)), shown(FIRST, ())]
-    ordered, walls, seen = fold_planes(planes, Resolution(along_ray=0.02, across_ray=0.02))
+    ordered, walls, seen = unfold_planes(planes, Resolution(along_ray=0.02, across_ray=0.02))
     assert seen == ((), (0,), (0, 1))
     assert ordered == (planes[2], planes[1], planes[0])
     for wall, true in zip(walls, (FIRST, SECOND, third), strict=True):

@@ -118,7 +118,7 @@ def test_several_users_each_have_an_answer(room: Room) -> None:
     assert error_of(estimate.users[1], np.array([-0.07, 0.15, 0.0])) <= 1e-4
 
 
-def test_a_wall_seen_through_another_is_folded_and_reflects_too(world: Any) -> None:
+def test_a_wall_seen_through_another_is_unfolded_and_reflects_too(world: Any) -> None:
     # The second wall, 20 cm at 100° through (0.25, 0.3), shows in the first as a ghost behind it.
     frequencies = np.linspace(220e9, 295e9, 401)  # 0.8 m of unambiguous range
     rng = np.random.default_rng(1)
@@ -143,13 +143,13 @@ def test_a_wall_seen_through_another_is_folded_and_reflects_too(world: Any) -> N
     )
     estimate = locate(Measurement(echo=echo, uplinks=(pilot,), clock_offset=0.0))
     assert [mirror.seen_through for mirror in estimate.mirrors] == [(), (0,)]
-    folded = estimate.mirrors[1]
+    unfolded = estimate.mirrors[1]
     along = np.array([np.cos(np.radians(100)), np.sin(np.radians(100)), 0.0])
     normal = np.array([along[1], -along[0], 0.0])
-    middle = 0.5 * (folded.start + folded.end)
+    middle = 0.5 * (unfolded.start + unfolded.end)
     assert abs((middle - [0.25, 0.3, 0.0]) @ normal) <= 2e-4
     assert abs((middle - [0.25, 0.3, 0.0]) @ along) <= 7e-3  # a cell across the ray
-    assert abs(folded.normal @ along) <= 3e-3  # its angle, and twice that of the first
+    assert abs(unfolded.normal @ along) <= 3e-3  # its angle, and twice that of the first
     answer = only(estimate)
     assert (answer.status, answer.bounces) == ("found", 2)
     assert error_of(answer, user) <= 1.5e-3

@@ -42,15 +42,15 @@ def test_a_ghost_maps_back_onto_its_target() -> None:
     target = np.array([0.2, 0.32, 0.0])
     ghost = mirrored(target, SLANTED.start, SLANTED.end)
     at_both = np.stack([target, ghost])
-    folded = corrected_image(spot(ghost), at_both, [SLANTED], possible_chains([SLANTED]))
-    image = folded.values
+    unfolded = corrected_image(spot(ghost), at_both, [SLANTED], possible_chains([SLANTED]))
+    image = unfolded.values
     assert abs(image[0]) == pytest.approx(1.0, abs=1e-12)
     assert image[1] == 0  # and nothing is left where it seemed to be
     # The value is the raw image's at the ghost, phase and all.
     assert image[0] == pytest.approx(np.exp(1j * ghost[0]), abs=1e-12)
     # What moved is recorded: over the mirror, and nothing is seen behind it.
-    assert folded.chains[folded.chain[0]] == (0,)
-    assert folded.chain[1] == -1
+    assert unfolded.chains[unfolded.chain[0]] == (0,)
+    assert unfolded.chain[1] == -1
 
 
 @settings(deadline=None, max_examples=50)
@@ -71,18 +71,18 @@ def test_nothing_behind_a_wall_remains_and_what_is_seen_directly_is_untouched(
     assume(abs(far - 1) > 1e-6)
     assume(abs(abs(far * image[0]) - 0.1) > 1e-6)
     through = 0 < far < 1 and abs(far * image[0]) < 0.1
-    folded = corrected_image(one, point, [SLANTED], possible_chains([SLANTED]))
-    assert folded.values[0] == int(not hidden or through)
-    assert (folded.chain[0] >= 0) == (not hidden or through)
+    unfolded = corrected_image(one, point, [SLANTED], possible_chains([SLANTED]))
+    assert unfolded.values[0] == int(not hidden or through)
+    assert (unfolded.chain[0] >= 0) == (not hidden or through)
 
 
 def test_without_walls_the_image_stays_as_it_is() -> None:
     points = np.random.default_rng(1).uniform([-0.3, 0.1, 0], [0.3, 0.5, 0], (4, 5, 3))
     focuser = spot(np.array([0.0, 0.3, 0.0]), width=0.2)
-    folded = corrected_image(focuser, points, [], possible_chains([]))
-    np.testing.assert_array_equal(folded.values, focuser(points))
-    assert folded.chains == ((),)
-    assert not folded.chain.any()
+    unfolded = corrected_image(focuser, points, [], possible_chains([]))
+    np.testing.assert_array_equal(unfolded.values, focuser(points))
+    assert unfolded.chains == ((),)
+    assert not unfolded.chain.any()
 
 
 def test_of_two_views_of_a_thing_the_brighter_is_kept() -> None:
@@ -94,10 +94,10 @@ def test_of_two_views_of_a_thing_the_brighter_is_kept() -> None:
     def focuser(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
         return np.asarray(sum(spot(ghost)(points) * (i + 1) for i, ghost in enumerate(ghosts)))
 
-    folded = corrected_image(focuser, target[None], both, possible_chains(both))
+    unfolded = corrected_image(focuser, target[None], both, possible_chains(both))
     # The brighter one, as the raw image has it; the other is centimetres off: exp(-(40/5)²).
-    assert folded.values[0] == pytest.approx(2 * np.exp(1j * ghosts[1][0]), abs=1e-12)
-    assert folded.chains[folded.chain[0]] == (1,)
+    assert unfolded.values[0] == pytest.approx(2 * np.exp(1j * ghosts[1][0]), abs=1e-12)
+    assert unfolded.chains[unfolded.chain[0]] == (1,)
 
 
 def test_the_focuser_is_asked_only_for_what_is_seen() -> None:
@@ -124,9 +124,9 @@ def test_the_echo_over_a_mirror_focuses_on_the_target_itself(world: Any) -> None
     x, y = [-0.02, -4e-3, 0.0, 4e-3, 0.02], [-0.01, -2e-3, 0.0, 2e-3, 0.01]
     offsets = np.stack(np.meshgrid(x, y, [0.0], indexing="ij"), axis=-1)
     around = target + offsets[:, :, 0]
-    folded = corrected_image(
+    unfolded = corrected_image(
         lambda points: focus(ready, points), around, [SLANTED], possible_chains([SLANTED])
     )
-    image = np.abs(folded.values)
+    image = np.abs(unfolded.values)
     assert int(np.argmax(image)) == 12  # the one in the middle
     assert image[2, 2] == pytest.approx(1.0, abs=1e-3)  # what back-projection promises

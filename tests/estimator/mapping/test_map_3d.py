@@ -46,7 +46,7 @@ def test_all_peaks_on_one_plane_are_still_a_plane() -> None:
     assert len(found.members) == 40
 
 
-def test_a_walls_ghost_folds_back_onto_it_with_its_covariance() -> None:
+def test_a_walls_ghost_unfolds_onto_it_with_its_covariance() -> None:
     mirror = square(np.array([0.0, 1.5, 0.0]), np.array([0.4, -1.0, 0.0]))
     spread = np.array([[4e-6, 1e-6, 2e-7], [1e-6, 9e-6, 0.0], [2e-7, 0.0, 1e-6]])
     true = square(np.array([0.8, 0.9, 0.1]), np.array([-1.0, -0.3, 0.2]))
@@ -56,16 +56,16 @@ def test_a_walls_ghost_folds_back_onto_it_with_its_covariance() -> None:
         axes=true.axes - 2 * np.outer(true.axes @ mirror.normal, mirror.normal),
         covariance=spread,
     )
-    folded = mirrored_wall(ghost, mirror)
-    np.testing.assert_allclose(folded.corners, true.corners, atol=1e-12)
-    assert abs(folded.normal @ true.normal) == pytest.approx(1.0, abs=1e-12)
-    # Oracle: move the ghost, mirror its corners; the folded wall's height there must have the
+    unfolded = mirrored_wall(ghost, mirror)
+    np.testing.assert_allclose(unfolded.corners, true.corners, atol=1e-12)
+    assert abs(unfolded.normal @ true.normal) == pytest.approx(1.0, abs=1e-12)
+    # Oracle: move the ghost, mirror its corners; the unfolded wall's height there must have the
     # spread that its covariance claims.
     point = np.array([0.2, -0.1])
-    at = np.array([*(folded.axes @ (true.axes.T @ point)), 1.0])
+    at = np.array([*(unfolded.axes @ (true.axes.T @ point)), 1.0])
     heights = np.stack([point[0], point[1], 1.0])
     ghost_axes_height = heights @ spread @ heights
-    assert at @ folded.covariance @ at == pytest.approx(ghost_axes_height, rel=1e-9)
+    assert at @ unfolded.covariance @ at == pytest.approx(ghost_axes_height, rel=1e-9)
 
 
 def test_a_flat_waves_direction_error_tilts_the_wall_about_its_foot() -> None:
@@ -105,9 +105,9 @@ def test_a_ghost_behind_a_wall_moves_in_front_and_the_wall_stays(world: Any) -> 
     assert raw[0] > 0.9  # interpolated linearly over half its width
     assert raw[1] < 1e-3
     chains = possible_chains([mirror])
-    folded = np.abs(corrected_image(survey.at, places, [mirror], chains, skin=0.02).values)
-    assert folded[0] == 0.0
-    assert folded[1] == pytest.approx(raw[0], rel=1e-9)
+    unfolded = np.abs(corrected_image(survey.at, places, [mirror], chains, skin=0.02).values)
+    assert unfolded[0] == 0.0
+    assert unfolded[1] == pytest.approx(raw[0], rel=1e-9)
 
 
 def test_a_gate_keeps_what_is_near_and_drops_what_is_far() -> None:

@@ -51,7 +51,7 @@ def mapped(world: Any, samples: Complex[np.ndarray, "m f"], snr_db: float = 20.0
     return build_room_map(Echo(samples=noisy, positions=world.array(), frequencies=BAND))
 
 
-def test_a_hidden_post_is_folded_to_where_it_stands(world: Any) -> None:
+def test_a_hidden_post_is_unfolded_to_where_it_stands(world: Any) -> None:
     ghost = mirrored(HIDDEN, WALL[0], WALL[1])
     samples = rough_wall(world, np.random.default_rng(0)) + points(world, ghost[None], 10.0)
     room = mapped(world, samples)

@@ -1,4 +1,4 @@
-"""Lines of the image, folded over each other to walls."""
+"""Lines of the image, unfolded over each other to walls."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.geometry.specular_chains import image_over
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.geometry.wall_covariance import place_covariance
-from estimator.mapping.wall_unfolding import fold_lines, fold_seen_lines
+from estimator.mapping.wall_unfolding import unfold_lines, unfold_seen_lines
 from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
@@ -46,11 +46,11 @@ LINES = (
 )
 
 
-def test_walls_behind_walls_are_folded_one_after_the_other() -> None:
+def test_walls_behind_walls_are_unfolded_one_after_the_other() -> None:
     for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0)):
-        folded = fold_lines([LINES[i] for i in order], RESOLUTION)
-        assert folded.seen_through == ((), (0,), (0, 1))
-        for found, true in zip(folded.walls, TRUE, strict=True):
+        unfolded = unfold_lines([LINES[i] for i in order], RESOLUTION)
+        assert unfolded.seen_through == ((), (0,), (0, 1))
+        for found, true in zip(unfolded.walls, TRUE, strict=True):
             np.testing.assert_allclose(found.start, true.start, atol=1e-12)
             np.testing.assert_allclose(found.end, true.end, atol=1e-12)
 
@@ -58,9 +58,9 @@ def test_walls_behind_walls_are_folded_one_after_the_other() -> None:
 def test_another_view_of_a_known_wall_is_no_second_one() -> None:
     inside = np.array([[0.2, 0.4, 0.0], [0.35, 0.65, 0.0]])  # seen directly and over the first
     again = line(image_over(inside + 1e-3, TRUE, (0,)))  # half a cell off
-    folded = fold_lines([line(FIRST), line(inside), again], RESOLUTION)
-    assert len(folded.walls) == 2
-    assert folded.seen_through == ((), ())
+    unfolded = unfold_lines([line(FIRST), line(inside), again], RESOLUTION)
+    assert len(unfolded.walls) == 2
+    assert unfolded.seen_through == ((), ())
 
 
 @pytest.mark.parametrize("direct", ["seen", "not seen"])
@@ -75,38 +75,38 @@ def test_what_goes_out_over_a_mirror_and_comes_back_directly_is_no_wall(direct: 
     lines = [line(FIRST), line(over), line(halfway, level=0.5)]
     if direct == "seen":
         lines.append(line(inside, level=0.5))
-    folded = fold_seen_lines(lines, RESOLUTION)
-    assert len(folded.walls) == 2
-    np.testing.assert_allclose(folded.walls[0].start, FIRST[0])
-    np.testing.assert_allclose(folded.walls[1].start, inside[0], atol=1e-12)
+    unfolded = unfold_seen_lines(lines, RESOLUTION)
+    assert len(unfolded.walls) == 2
+    np.testing.assert_allclose(unfolded.walls[0].start, FIRST[0])
+    np.testing.assert_allclose(unfolded.walls[1].start, inside[0], atol=1e-12)
     # A wall just beside that place stays.
     stays = halfway + np.array([0.08, 0.0, 0.0])
-    assert len(fold_seen_lines([*lines, line(stays)], RESOLUTION).walls) == 3
+    assert len(unfold_seen_lines([*lines, line(stays)], RESOLUTION).walls) == 3
 
 
 def test_a_line_beside_a_mirror_is_seen_directly() -> None:
     aside = np.array([[0.4, 0.7, 0.0], [0.5, 0.5, 0.0]])
-    folded = fold_lines([line(FIRST), line(aside, level=4.0)], RESOLUTION)
-    assert folded.seen_through == ((), ())
-    np.testing.assert_array_equal(folded.walls[0].start, aside[0])  # the strongest first
+    unfolded = unfold_lines([line(FIRST), line(aside, level=4.0)], RESOLUTION)
+    assert unfolded.seen_through == ((), ())
+    np.testing.assert_array_equal(unfolded.walls[0].start, aside[0])  # the strongest first
 
 
-def test_nothing_is_folded_from_nothing() -> None:
-    folded = fold_lines([], RESOLUTION)
-    assert folded.walls == ()
-    assert folded.covariance.shape == (0, 0)
+def test_nothing_is_unfolded_from_nothing() -> None:
+    unfolded = unfold_lines([], RESOLUTION)
+    assert unfolded.walls == ()
+    assert unfolded.covariance.shape == (0, 0)
 
 
-def test_a_folded_wall_errs_with_its_mirrors() -> None:
-    folded = fold_lines(LINES, RESOLUTION)
-    # In closed form: a mirror's error of angle turns what is folded twice. Each line errs by
+def test_an_unfolded_wall_errs_with_its_mirrors() -> None:
+    unfolded = unfold_lines(LINES, RESOLUTION)
+    # In closed form: a mirror's error of angle turns what is unfolded twice. Each line errs by
     # itself, so the angle's variances add up, the mirrors' four times.
     variances = [DEVIATIONS[0] ** 2 * (1 + 4 * before) for before in range(3)]
-    found = np.diag(folded.covariance)[::2]
+    found = np.diag(unfolded.covariance)[::2]
     assert found[0] == pytest.approx(variances[0], rel=1e-6)
     assert found[1] == pytest.approx(variances[1], rel=1e-6)
-    for index, one in enumerate(folded.walls):
-        block = folded.covariance[2 * index : 2 * index + 2, 2 * index : 2 * index + 2]
+    for index, one in enumerate(unfolded.walls):
+        block = unfolded.covariance[2 * index : 2 * index + 2, 2 * index : 2 * index + 2]
         np.testing.assert_array_equal(one.covariance, block)
     # Against draws of all the lines' errors.
     rng = np.random.default_rng(1)
@@ -119,7 +119,7 @@ def test_a_folded_wall_errs_with_its_mirrors() -> None:
             moved = seen.moved(np.array([tilt, offset]))
             shaken.append(line(np.stack([moved.start, moved.end])))
         row = []
-        for new, old in zip(fold_lines(shaken, RESOLUTION).walls, folded.walls, strict=True):
+        for new, old in zip(unfold_lines(shaken, RESOLUTION).walls, unfolded.walls, strict=True):
             along = (old.end - old.start) / np.linalg.norm(old.end - old.start)
             turned = (new.end - new.start) / np.linalg.norm(new.end - new.start)
             normal = np.array([along[1], -along[0], 0.0])
@@ -129,17 +129,19 @@ def test_a_folded_wall_errs_with_its_mirrors() -> None:
             ]
         draws.append(row)
     drawn = np.cov(np.array(draws).T)
-    scale = np.sqrt(np.outer(np.diag(folded.covariance), np.diag(folded.covariance)))
+    deviations = np.sqrt(np.diag(unfolded.covariance))
+    scale = np.outer(deviations, deviations)
     # A covariance of 200 draws is known to 1/√200 of the deviations' product, or √2 of it.
-    np.testing.assert_allclose(drawn / scale, folded.covariance / scale, atol=4 * np.sqrt(2 / 200))
+    stated = unfolded.covariance / scale
+    np.testing.assert_allclose(drawn / scale, stated, atol=4 * np.sqrt(2 / 200))
 
 
-def test_a_folded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
-    folded = fold_lines(LINES[:1], RESOLUTION)
+def test_an_unfolded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
+    unfolded = unfold_lines(LINES[:1], RESOLUTION)
     target = np.array([0.5, 0.8, 0.0])
     ghost = mirrored(target, FIRST[0], FIRST[1])
     own = np.diag([1e-8, 4e-8, 0.0])
-    found = place_covariance(ghost, own, folded.walls, folded.covariance, (0,))
+    found = place_covariance(ghost, own, unfolded.walls, unfolded.covariance, (0,))
     # 45°: what was across is along. The place is 0.5 m off the wall's midpoint, at 45° to it:
     # turned twice by the angle's error, moved twice by the offset's along the normal.
     normal, along = np.array([1.0, -1.0]) / np.sqrt(2), np.array([1.0, 1.0]) / np.sqrt(2)
@@ -151,5 +153,5 @@ def test_a_folded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
         found[:2, :2], np.diag([4e-8, 1e-8]) + shift + turn, rtol=1e-5, atol=1e-14
     )
     np.testing.assert_array_equal(
-        place_covariance(ghost, own, folded.walls, folded.covariance, ()), own
+        place_covariance(ghost, own, unfolded.walls, unfolded.covariance, ()), own
     )

@@ -177,7 +177,7 @@ def test_a_direct_path_is_the_user(dim: Dimension) -> None:
     assert (found.elevation is None) == (dim is PLANE)
 
 
-def test_a_path_over_a_known_wall_is_folded_to_the_user(dim: Dimension) -> None:
+def test_a_path_over_a_known_wall_is_unfolded_to_the_user(dim: Dimension) -> None:
     user = dim.user(1.0, 0.8)
     found = decided(dim, [reflected(dim, user)], room(slanted(dim)))
     assert (found.status, found.bounces, found.line_of_sight) == ("found", 1, False)
@@ -315,7 +315,7 @@ def test_a_ray_between_two_loose_points_may_pass_over_a_wall_too_smooth_to_be_se
     assert found.reason is not None
     assert "too smooth to be seen" in found.reason
     (other,) = found.alternatives
-    at(other, dim.user(0.0, 0.1), 1e-9)  # folded at y = 0.5
+    at(other, dim.user(0.0, 0.1), 1e-9)  # unfolded at y = 0.5
     # A user before them, or beside, is not in doubt; nor is one over a wall that is seen.
     for place in (dim.user(0.0, 0.45), 0.9 * dim.user(0.5, 0.866)):
         assert decided(dim, [direct(dim, place)], room(peaks=ends)).status == "found"

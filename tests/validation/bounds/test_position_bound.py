@@ -241,9 +241,9 @@ def test_known_walls_give_the_bound_of_the_image() -> None:
     bound_of = partial(
         position_error_bound, positions=linear_array(), frequencies=FREQUENCIES, snr=100.0
     )
-    folded = bound_of(user, planes=[WALL], paths=[(0,)])
+    unfolded = bound_of(user, planes=[WALL], paths=[(0,)])
     direct = bound_of(image)
-    turned = by_user[:2, :2] @ folded.covariance @ by_user[:2, :2].T
+    turned = by_user[:2, :2] @ unfolded.covariance @ by_user[:2, :2].T
     np.testing.assert_allclose(turned, direct.covariance, rtol=1e-9)
 
 
@@ -255,7 +255,7 @@ def test_an_uncertain_wall_adds_its_lever() -> None:
     bound = bound_of(
         user, planes=[WALL], paths=[(0,)], plane_covariance=np.diag([tilt**2, offset**2])
     )
-    # Without noise the image is known; the fold turns it by twice the tilt about the wall's point.
+    # Without noise the image is known; unfolding turns it by twice the tilt about the wall's point.
     expected = np.hypot(2 * tilt * np.linalg.norm(user - WALL.point), 2 * offset)
     assert bound.deviation == pytest.approx(float(expected), rel=1e-3)
 

@@ -25,7 +25,7 @@ def scene(rms_mm: float, *more: str) -> Scenario:
 
 
 def found_position(scenario: Scenario, seed: int) -> Float[np.ndarray, " 2"]:
-    """Fit one wave to the noise-free pilot, and fold it over the known wall y = x + 0.4."""
+    """Fit one wave to the noise-free pilot, and unfold it over the known wall y = x + 0.4."""
     ready = radio_scene(scenario, seed=seed, sample=0)
     assert ready.facets is not None
     array = facet_ports(ready, ready.facets, scenario.base_station.antenna, ready.elements)

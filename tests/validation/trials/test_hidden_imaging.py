@@ -33,7 +33,7 @@ def failed(result: HiddenImaging) -> list[str]:
     return [row.name.split(",")[0] for row in hidden_rows([result]) if not row.passed]
 
 
-def test_ghosts_fold_back_onto_the_posts_front_faces(posts: HiddenImaging) -> None:
+def test_ghosts_unfold_onto_the_posts_front_faces(posts: HiddenImaging) -> None:
     assert failed(posts) == []
     assert [target.name for target in posts.targets] == ["far_post", "near_post"]
 
@@ -55,16 +55,16 @@ def test_a_post_beside_its_place_is_told(posts: HiddenImaging) -> None:
     first, second = posts.targets
     near = replace(first, range_error=-2e-3, across_error=1.1 * first.cell_across)
     assert failed(replace(posts, targets=(near, second))) == [
-        "folded front faces along range", "folded front faces across",
+        "unfolded front faces along range", "unfolded front faces across",
     ]  # fmt: skip
 
 
 def test_nothing_found_fails_instead_of_passing_for_want_of_errors(posts: HiddenImaging) -> None:
     nothing = replace(posts, targets=(), missed=("far_post", "near_post"))
-    assert "folded front faces along range" in failed(nothing)
+    assert "unfolded front faces along range" in failed(nothing)
 
 
-def test_raw_and_folded_image_are_drawn_in_metres(posts: HiddenImaging) -> None:
+def test_raw_and_unfolded_image_are_drawn_in_metres(posts: HiddenImaging) -> None:
     figure = Figure()
     draw_hidden(figure, posts)
     left, right = figure.axes[:2]

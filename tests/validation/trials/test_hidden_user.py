@@ -97,11 +97,11 @@ def lab() -> UserTrial:
 
 
 @pytest.mark.slow
-def test_the_second_wall_is_seen_behind_the_first_and_folds_back(lab: UserTrial) -> None:
+def test_the_second_wall_is_seen_behind_the_first_and_is_unfolded(lab: UserTrial) -> None:
     scenario = load_scenario("lab_two_walls")
     result = fig04_14_lab_two_walls.LabTwoWalls(scenario=scenario, trials=(lab,))
     # At half the size the array resolves the second wall's angle half as well.
-    other = {"angle of wall 2, folded, one realisation"}
+    other = {"angle of wall 2, unfolded, one realisation"}
     table = fig04_14_lab_two_walls.rows(result)
     assert {row.name for row in table if not row.passed} <= other
     figure = Figure()
