@@ -41,7 +41,7 @@ EXCESS = 1e-2
 covariance of a wave. [per wave]"""
 
 
-def threshold(rate: float, *, cells: float = 1.0) -> float:
+def threshold(rate: float, *, cells: int | float = 1) -> float:
     """Return the intensity, over the mean of noise, that is passed with some probability.
 
     Parameters

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import label
 
+from estimator import false_alarm
 from estimator.array.resolution import HALF_POWER
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER
@@ -30,8 +31,7 @@ from estimator.walls.line_relations import BEYOND_END, lies_on
 LEAST_COHERENCE = 0.3
 """Of a target over the aperture: with a cloud as strong as itself in its own range it has 0.5;
 speckle of a cloud, and sidelobes, stay below 0.2 in nine cases of ten. [-]"""
-FALSE_TARGETS = 1e-3
-"""Targets that noise alone makes in a whole image, in the mean."""
+
 SIDELOBE = 1e-4
 """Intensity of a sidelobe over its peak: 10 dB above the taper's, for what roughness and a
 curved front add. [-]"""
@@ -100,7 +100,9 @@ def find_targets(
     """
     coarse = coarse_resolution(resolution)
     intensity = np.abs(looked.values) ** 2
-    threshold = looked.background * np.log(intensity.size / FALSE_TARGETS)
+    threshold = looked.background * false_alarm.threshold(
+        false_alarm.TARGET, cells=float(intensity.size)
+    )
     coherent = np.maximum(looked.as_point, looked.as_mirror)
     seen = ~looked.bent & (coherent >= LEAST_COHERENCE)
     spots = [

@@ -22,7 +22,7 @@ from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.specular_chains import Chain
-from estimator.positioning.los_check import doubt_straight_way
+from estimator.positioning.los_check import check_line_of_sight
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.weighted_least_squares import Consensus, Sighting, solve_position
 from estimator.results.estimate import PathReport, UserEstimate
@@ -110,7 +110,7 @@ def _on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     (only,) = best.sightings
     if only.chain:
         return answer
-    return doubt_straight_way(answer, found.paths[only.path].wave, room, found.how)
+    return check_line_of_sight(answer, found.paths[only.path].wave, room, found.how)
 
 
 def _on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:

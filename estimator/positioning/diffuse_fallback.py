@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.stats import chi2
 
+from estimator import false_alarm
 from estimator.geometry.bearing_2d import LINEAR
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.wall_2d import Wall, mirrored
@@ -23,7 +24,7 @@ CELLS_APART = 3.0
 """Cross-range cells λR/D from a strong path's place at which the diffuse field contradicts it:
 walls that are not quite where they were found move both, and each in its own way. [-]"""
 
-SAME = float(chi2.ppf(0.999, df=2))
+SAME = float(chi2.ppf(1 - false_alarm.DISAGREEMENT, df=2))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
 
 

@@ -1,8 +1,8 @@
-"""What may turn a ray that seems to go straight: mirrors that the image does not show as such.
+"""Whether a path that seems direct is in line of sight: mirrors that the image does not show.
 
-A wall too smooth to scatter echoes from its two ends alone, and reflects all the better; a short
-one shows as a few peaks without a direction; in an echo that is nearly all noise no wall shows.
-No measurement of the user's pilot can tell its image in such a mirror from the user.
+A wall too smooth for a diffuse echo shows at its two ends only, and reflects all the better; a
+short one shows as a few peaks without a direction; in an echo that is nearly all noise no wall
+shows. The user's pilot alone cannot distinguish the user from its image in such a mirror.
 """
 
 from dataclasses import replace
@@ -20,11 +20,12 @@ from estimator.positioning.unseen_mirrors import wall_between
 from estimator.results.estimate import UserEstimate
 
 LOOSE_PEAKS = 12
-"""Strongest loose peaks between which an unseen wall is suspected."""
+"""Strongest peaks on no wall between which an unseen wall is suspected: 66 pairs. [-]"""
 BESIDE = 2.0
-"""Cells beside a ray within which a peak stands on it. [-]."""
+"""Distance beside a ray within which a peak is on it, as for a line
+(:data:`estimator.walls.line_relations.BESIDE`). [cells]"""
 USER_SIZE = 0.05
-"""How far before the end of a path the user itself may echo. [m]."""
+"""Distance before the end of a path within which the user's own body may echo. [m]"""
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
@@ -32,15 +33,15 @@ was found in all images with more than 85, in some of those with 40 to 85 and in
 rest is margin for walls that are farther or smoother. [-]"""
 
 
-def doubt_straight_way(
+def check_line_of_sight(
     answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing
 ) -> UserEstimate:
-    """Doubt a straight way on which something may stand that is no wall the image knows.
+    """Doubt a direct path on which something may stand that the image does not show as a wall.
 
     Parameters
     ----------
     answer
-        Where the way ends, if it is straight.
+        Where the path ends, if it is direct.
     wave
         That came over it.
     room
@@ -140,7 +141,7 @@ def unseen_mirror(
     resolution: Resolution,
     how: Bearing,
 ) -> FlatWall | None:
-    """Return a wall between two loose points that the ray meets before its end, if there is one.
+    """Return a wall between two peaks on no wall that the ray meets before its end, if any.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ def what_stands_in_the_way(
     unassigned_peaks: Float[np.ndarray, "peaks 3"],
     cell: float,
 ) -> Float[np.ndarray, " 3"] | None:
-    """Return the strongest loose point that stands on the ray before its end, if there is one.
+    """Return the strongest peak on no wall that is on the ray before its end, if there is one.
 
     Parameters
     ----------
