@@ -318,6 +318,8 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
             f"base_station.elements = {list(scenario.base_station.elements)}: a planar array "
             "needs dimensions = 3; give one number of elements"
         )
+    if flat:
+        found += _polarization_problems(scenario)
     stations: dict[str, BaseStation | User] = {"base_station": scenario.base_station}
     stations |= {f"users.{name}": user for name, user in scenario.users.items()}
     for key, station in stations.items():
@@ -331,6 +333,27 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
             for key, point in points.items()
             if point[2] != 0
         ]
+    return found
+
+
+def _polarization_problems(scenario: Scenario) -> list[str]:
+    """In two dimensions the field is along z."""
+    station, found = scenario.base_station, []
+    antennas = {"base_station.antenna": station.antenna}
+    if station.transmitter is not None and station.transmitter.antenna is not None:
+        antennas["base_station.transmitter.antenna"] = station.transmitter.antenna
+    antennas |= {f"users.{name}.antenna": user.antenna for name, user in scenario.users.items()}
+    for key, antenna in antennas.items():
+        if antenna.polarization_deg != 0.0:
+            found.append(
+                f"{key}.polarization = {antenna.polarization!r}: in two dimensions the field is "
+                "along z; leave it out ('vertical'), or set dimensions = 3"
+            )
+        if antenna.cross_polar_db is not None:
+            found.append(
+                f"{key}.cross_polar_db = {antenna.cross_polar_db}: in two dimensions nothing is "
+                "cross-polar; leave it out, or set dimensions = 3"
+            )
     return found
 
 

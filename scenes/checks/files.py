@@ -11,6 +11,7 @@ from scenes.schema.errors import ScenarioError
 from scenes.schema.materials import Slab
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from scenes.schema.permittivity_table import band_problem, read_permittivity_table
+from scenes.schema.roughness import Roughness
 from scenes.surfaces.heights import Heights
 from scenes.surfaces.mesh_section_2d import mesh_segments
 from scenes.surfaces.primitives import upright_shape
@@ -56,9 +57,43 @@ def file_problems(
                     found.append(f"objects.{name}.{key}: {error}")
         if not found and body.frozen is not None:
             found += _misplaced(name, body, body.frozen, flat=flat)
+        if body.roughness is not None:
+            found += _height_problems(name, body, body.roughness, flat=flat)
         if isinstance(body.material, Slab) and body.material.file is not None:
             found += _table_problems(name, Path(body.material.file), frequencies)
     return found
+
+
+def _height_problems(
+    name: str, body: Plate | Cylinder | Box | MeshFile, roughness: Roughness, *, flat: bool
+) -> list[str]:
+    """Tell whether measured heights cover the object."""
+    measured = roughness.measured
+    if measured is None:
+        return []
+    key = f"objects.{name}.roughness.file = {roughness.file!r}"
+    if isinstance(body, Cylinder):
+        return [f"{key}: measured heights do not close round a cylinder; use a plate or a box"]
+    if measured.profile and not flat:
+        return [f"{key}: a single profile, and the scene has 3 dimensions; give a height map"]
+    if roughness.repeat:
+        return []
+    if isinstance(body, MeshFile):
+        return [f"{key}: a mesh's faces are not known beforehand; set roughness.repeat = true"]
+    sides = [body.length_m, *([body.depth_m] if isinstance(body, Box) else [])]
+    needed = [(side, 0.0) for side in sides]
+    if body.height_m is not None:
+        needed = [(side, body.height_m) for side in sides]
+        needed += [(sides[0], sides[1])] if len(sides) == 2 else []
+    extent = [measured.step * (count - 1) for count in measured.heights.shape]
+    for face in needed:
+        if any(side > there * (1 + 1e-9) for side, there in zip(face, extent, strict=True)):
+            sizes = [" x ".join(f"{1e3 * side:.4g}" for side in two) for two in (extent, face)]
+            return [
+                f"{key}: covers {sizes[0]} mm, and a face has {sizes[1]} mm; measure more, or set "
+                "roughness.repeat = true (continued by mirror images)"
+            ]
+    return []
 
 
 def _table_problems(name: str, path: Path, frequencies: Float[np.ndarray, " freqs"]) -> list[str]:

@@ -299,7 +299,9 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
     for group in ("materials", "objects"):
         bodies += _group(geometry if isinstance(geometry, dict) else {}, group).values()
     for body in bodies:
-        tables = [body, body.get("material")] if isinstance(body, dict) else []
+        tables = (
+            [body, body.get("material"), body.get("roughness")] if isinstance(body, dict) else []
+        )
         for table in tables:
             if not isinstance(table, dict):
                 continue

@@ -27,8 +27,8 @@ class Relocatable:
 def relocatable(scenario: Scenario) -> Relocatable:
     """Lay a scenario out so that, with its files copied beside it, it can be moved anywhere.
 
-    Meshes and tables of permittivity go to the folder ``NAME_files`` under their own names,
-    with a number where two differ in their folder only.
+    Meshes, height maps and tables of permittivity go to the folder ``NAME_files`` under their
+    own names, with a number where two differ in their folder only.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def relocatable(scenario: Scenario) -> Relocatable:
     tables = tomllib.loads(scenario_to_toml(scenario))
     places: dict[Path, str] = {}
     for body in tables.get("objects", {}).values():
-        for table in (body, body["material"]):
+        for table in (body, body["material"], body.get("roughness")):
             if not isinstance(table, dict):
                 continue
             for key in [key for key in ("file", "realisation") if key in table]:

@@ -22,6 +22,7 @@ from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.errors import did_you_mean
 from scenes.schema.materials import Slab
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from scenes.schema.roughness import Roughness
 from scenes.surfaces.facet_spacing import BYTES_PER_FACET, MOST_BYTES, facet_count
 from scenes.surfaces.heights import Heights
 from scenes.surfaces.primitives import in_reach, shape_in_reach, upright_shape
@@ -41,6 +42,7 @@ class Surface:
     screens: Int[np.ndarray, "screens 3"] = field(
         default_factory=lambda: np.empty((0, 3), dtype=np.int64)
     )  # triangles where nobody looks: they only block rays
+    roughness: Roughness | None = None  # statistics of the heights; None: none are known
 
 
 def object_surface(
@@ -110,6 +112,7 @@ def object_surface(
         cells=shape.cells,
         closed=closed,
         screens=shape.screens,
+        roughness=body.roughness,
     )
 
 

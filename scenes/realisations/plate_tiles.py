@@ -14,9 +14,6 @@ from scenes.surfaces.facet_spacing import steps
 from scenes.surfaces.heights import Heights
 from scenes.surfaces.shape import grid_triangles
 
-ROWS_AT_ONCE = 256
-"""Rows of heights whose slopes are looked at in one go. [-]"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Tile:
@@ -47,21 +44,6 @@ class PlateSheet:
         """Largest height over the mean plane, or depth below it [m]."""
         return float(max(self.heights.max(), -self.heights.min()))
 
-    @property
-    def steepest(self) -> float:
-        """Largest slope of a facet against the mean plane. [-].
-
-        Seen from farther above the plane than this, no facet hides another.
-        """
-        along, up = self.spacings
-        largest = 0.0
-        for first in range(0, len(self.heights) - 1, ROWS_AT_ONCE):
-            rows = self.heights[first : first + ROWS_AT_ONCE + 1]
-            a, b, c, d = rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]
-            for one, other in ((b - a, c - b), (c - d, d - a)):
-                largest = max(largest, float(((one / along) ** 2 + (other / up) ** 2).max()))
-        return float(np.sqrt(largest))
-
     def tiles(self, side: int) -> Iterator[Tile]:
         """Divide the plate into tiles of at most so many cells along each side."""
         count, rise = (size - 1 for size in self.heights.shape)
@@ -74,25 +56,9 @@ class PlateSheet:
                 radius = float(np.linalg.norm(corners - centre, axis=-1).max())
                 yield Tile(along=along, up=up, centre=centre, radius=radius)
 
-    def surface(self, tile: Tile, *, margin: float = 0.0) -> Surface:
-        """Make a surface of a tile; its facets are those of the whole plate there.
-
-        Parameters
-        ----------
-        tile
-            One of :meth:`tiles`.
-        margin
-            How far the surface goes beyond the tile, where the plate does. [m]
-        """
-        along, up = (
-            slice(
-                max(0, part.start - int(np.ceil(margin / spacing))),
-                min(size, part.stop + int(np.ceil(margin / spacing))),
-            )
-            for part, spacing, size in zip(
-                (tile.along, tile.up), self.spacings, self.heights.shape, strict=True
-            )
-        )
+    def surface(self, tile: Tile) -> Surface:
+        """Make a surface of a tile; its facets are those of the whole plate there."""
+        along, up = tile.along, tile.up
         heights = self.heights[along, up]
         mean = self._mean(along, up).reshape(-1, 3)
         return Surface(
@@ -102,6 +68,7 @@ class PlateSheet:
             mean_vertices=mean,
             cells=grid_triangles(np.arange(heights.size).reshape(heights.shape)),
             closed=False,
+            roughness=self.plate.roughness,
         )
 
     def _mean(self, along: slice, up: slice) -> Float[np.ndarray, "along up 3"]:

@@ -1,21 +1,61 @@
-"""Antennas of the base station and of the users: kind, width or gain, and where they look."""
+"""Antennas of the base station and of the users: kind, polarization, and where they look."""
 
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from scenes.schema.quantities import Angle, Checked, Name, Position
 
+POLARIZATION_DEG = {"vertical": 0.0, "horizontal": 90.0}
+"""Angle of the polarizations that have a name. [degree]"""
 
-class Isotropic(Checked):
+
+def _polarization(value: object) -> object:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if value in POLARIZATION_DEG or (number and abs(float(str(value))) <= 180.0):
+        return value
+    raise PydanticCustomError(
+        "polarization",
+        "must be 'vertical', 'horizontal', or an angle from the vertical between -180 and 180 "
+        "degrees; give one of them",
+    )
+
+
+class Polarized(Checked):
+    """What sends and receives one linear polarization."""
+
+    polarization: Annotated[
+        Literal["vertical", "horizontal"] | float, BeforeValidator(_polarization)
+    ] = Field(
+        "vertical",
+        description="'vertical', 'horizontal', or the angle from the vertical, to the right as "
+        "seen from behind the antenna [degree]",
+    )
+    cross_polar_db: float | None = Field(
+        None,
+        ge=-100,
+        le=0,
+        description="the cross-polar field over the co-polar one, in phase with it [dB]; "
+        "without, none",
+    )
+
+    @property
+    def polarization_deg(self) -> float:
+        """Angle of the polarization from the vertical [degree]."""
+        if isinstance(self.polarization, str):
+            return POLARIZATION_DEG[self.polarization]
+        return self.polarization
+
+
+class Isotropic(Polarized):
     """An antenna that radiates alike in all directions, 0 dBi."""
 
     kind: Literal["isotropic"] = "isotropic"
 
 
-class Directive(Checked):
+class Directive(Polarized):
     """What looks somewhere: at an object, at a point, or along an azimuth."""
 
     aim: Name | None = Field(None, description="the object at whose centre the antenna looks")

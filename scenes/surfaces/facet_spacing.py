@@ -41,9 +41,12 @@ def facet_spacing(body: Body, shortest_wavelength: float) -> float:
     spacing = shortest_wavelength / FACETS_PER_WAVELENGTH
     rough = body.roughness
     if rough is not None and rough.rms > 0:
-        spacing = min(spacing, rough.correlation_length / FACETS_PER_CORRELATION_LENGTH)
-        if rough.inner_cutoff > 0:
-            spacing = min(spacing, rough.inner_cutoff / FACETS_PER_CUTOFF)
+        for scale in rough.scales:
+            if scale.rms_mm == 0:
+                continue
+            spacing = min(spacing, scale.correlation_length / FACETS_PER_CORRELATION_LENGTH)
+            if scale.inner_cutoff > 0:
+                spacing = min(spacing, scale.inner_cutoff / FACETS_PER_CUTOFF)
     return spacing
 
 

@@ -50,11 +50,11 @@ def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
             "give a larger spacing"
         )
     vertices, faces = mesh.vertices, mesh.faces
-    if heights.statistics is None:
+    if heights.smooth:
         mean, cells, _ = refined(vertices, faces, np.zeros(len(faces), dtype=np.int64), spacing)
         return Shape(vertices=mean, mean_vertices=mean, cells=cells)
     patches = _flat_patches(mesh)
-    _refuse_small(body, mesh, patches, heights.statistics["correlation_length"])
+    _refuse_small(body, mesh, patches, heights.longest)
     mean, cells, patches = refined(vertices, faces, patches, spacing)
     return Shape(
         vertices=mean + _displacements(mean, cells, patches, heights),

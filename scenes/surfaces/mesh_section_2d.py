@@ -27,7 +27,7 @@ def mesh_lines(body: MeshFile, spacing: float, heights: Heights) -> Shape:
     ScenarioError
         If nothing of the mesh meets z = 0, or what does is not upright, or it should be rough.
     """
-    if heights.statistics is not None:
+    if not heights.smooth:
         raise ScenarioError(
             f"mesh file {body.file!r}: a mesh cannot be rough in two dimensions; set "
             "dimensions = 3, use a plate, box or cylinder, or leave it smooth (rms_mm = 0)"

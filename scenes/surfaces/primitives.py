@@ -60,7 +60,7 @@ def shape_in_reach(
             along, rise = body.length_m * body.tangent, height * _UP
             face = Face(corner=body.centre - (along + rise) / 2, first=along, second=rise)
             return _joined([tiled_face(face, spacing, reach, heights.sheet)])
-        case Box(height_m=float() as height) if heights.statistics is None:
+        case Box(height_m=float() as height) if heights.smooth:
             return _joined(
                 [tiled_face(face, spacing, reach, heights.sheet) for face in _faces(body, height)]
             )

@@ -13,9 +13,10 @@ spectrum         correlation function            :math:`W(k)` in d dimensions, t
 ===============  ==============================  =======================================
 ``gaussian``     :math:`\sigma^2 e^{-s^2/l^2}`   :math:`e^{-k^2 l^2/4}`
 ``exponential``  :math:`\sigma^2 e^{-s/l}`       :math:`(1+k^2l^2)^{-(d+1)/2} e^{-k^2c^2/4}`
+``power_law``    Matérn's of order H             :math:`(1+k^2l^2)^{-d/2-H} e^{-k^2c^2/4}`
 ===============  ==============================  =======================================
 
-The exponential surface would have unbounded slopes; the inner cut-off :math:`c` smooths its
+These surfaces would have unbounded slopes; the inner cut-off :math:`c` smooths their
 correlation function by :math:`e^{-s^2/c^2}`, and the total variance stays :math:`\sigma^2`.
 
 The waves depend on the size and the statistics alone, not on the number of samples: more
@@ -27,12 +28,15 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from scenes.schema.roughness import Spectrum
+from scenes.schema.roughness import Roughness, Spectrum
 
 NEGLIGIBLE = 1e-12
 """Waves weaker than this, relative to the strongest, are left out: 1e-6 of an amplitude [-]."""
 
-_REACH = {"gaussian": 4.0, "exponential": 12.0}
+SHARE_STEPS = 2000
+"""Steps of an integral over the spectrum: a hundredth of a wavenumber each. [-]"""
+
+_REACH = {"gaussian": 4.0, "exponential": 12.0, "power_law": 15.0}
 """Correlation lengths after which the correlation is below 1e-5 [-]."""
 
 
@@ -45,6 +49,7 @@ def rough_profile(
     spectrum: Spectrum,
     inner_cutoff: float,
     rng: np.random.Generator,
+    hurst: float = 0.5,
     periodic: bool = False,
 ) -> Float[np.ndarray, " count"]:
     """Draw the heights of a rough line.
@@ -61,9 +66,11 @@ def rough_profile(
     correlation_length
         Distance at which the correlation has fallen to 1/e. [m]
     spectrum
-        ``"gaussian"`` or ``"exponential"``.
+        ``"gaussian"``, ``"exponential"`` or ``"power_law"``.
     inner_cutoff
-        Length below which an exponential surface is smooth; not used for a Gaussian one. [m]
+        Length below which the surface is smooth; not used for a Gaussian spectrum. [m]
+    hurst
+        Exponent H of a power law; not used for others. [-]
     rng
         The stream of this surface.
     periodic
@@ -82,7 +89,7 @@ def rough_profile(
     _check(rms, correlation_length, spectrum, inner_cutoff)
     axis = _Axis(length, count, correlation_length, spectrum, inner_cutoff, periodic)
     wavenumber = axis.wavenumber * np.arange(axis.waves + 1)
-    power = _power(wavenumber**2, 1, correlation_length, spectrum, inner_cutoff)
+    power = _power(wavenumber**2, 1, correlation_length, spectrum, inner_cutoff, hurst)
     power[1:] *= 2  # k and -k
     amplitude = rms * np.sqrt(power / power.sum())
     parts = rng.standard_normal((axis.waves + 1, 2))
@@ -101,6 +108,7 @@ def rough_sheet(
     spectrum: Spectrum,
     inner_cutoff: float,
     rng: np.random.Generator,
+    hurst: float = 0.5,
     periodic: tuple[bool, bool] = (False, False),
 ) -> Float[np.ndarray, "first second"]:
     """Draw the heights of a rough rectangle with isotropic statistics.
@@ -111,7 +119,7 @@ def rough_sheet(
         Its two sides. [m]
     counts
         Number of heights along each; see :func:`rough_profile`.
-    rms, correlation_length, spectrum, inner_cutoff, rng
+    rms, correlation_length, spectrum, inner_cutoff, rng, hurst
         See :func:`rough_profile`.
     periodic
         Which of the two directions close on themselves (a cylinder's side).
@@ -133,7 +141,8 @@ def rough_sheet(
     order = np.concatenate([np.arange(first.waves + 1), np.arange(-first.waves, 0)])
     across = first.wavenumber * order
     along = second.wavenumber * np.arange(second.waves + 1)
-    power = _power(across[:, None] ** 2 + along**2, 2, correlation_length, spectrum, inner_cutoff)
+    squared = across[:, None] ** 2 + along**2
+    power = _power(squared, 2, correlation_length, spectrum, inner_cutoff, hurst)
     power[:, 1:] *= 2  # k and -k
     parts = rng.standard_normal((*power.shape, 2))
     waves = parts[..., 0] + 1j * parts[..., 1]
@@ -144,6 +153,47 @@ def rough_sheet(
     rows = np.fft.ifft(padded, axis=0, norm="forward")[first.kept]
     heights = np.fft.irfft(rows, n=second.grid, axis=1, norm="forward")
     return np.ascontiguousarray(heights[:, second.kept])
+
+
+def slope_share(roughness: Roughness | None, width: float) -> float:
+    r"""Share of the slopes' variance that is left when a surface is smoothed.
+
+    .. math:: g = \frac{\int k^3 W(k)\, e^{-k^2 w^2}\, dk}{\int k^3 W(k)\, dk}
+
+    Parameters
+    ----------
+    roughness
+        Statistics of its heights; None: of unknown ones nothing is smoothed.
+    width
+        Standard width w of the Gaussian that smooths along each direction. [m]
+
+    Returns
+    -------
+    1 for a surface much longer in its waves than the width, 0 for a much shorter one. [-]
+    """
+    if roughness is None or roughness.rms == 0 or width == 0:
+        return 1.0
+    if roughness.measured is not None:
+        return roughness.measured.slope_share(width)
+    left, whole = 0.0, 0.0
+    for scale in roughness.scales:
+        finest = scale.inner_cutoff or scale.correlation_length
+        top = 2.0 * math.sqrt(-math.log(NEGLIGIBLE)) / finest
+        wavenumbers = np.geomspace(1e-3 / scale.correlation_length, top, SHARE_STEPS)
+        power = _power(
+            wavenumbers**2,
+            2,
+            scale.correlation_length,
+            scale.spectrum,
+            scale.inner_cutoff,
+            scale.hurst,
+        )
+        power *= scale.rms_mm**2 / np.trapezoid(power * wavenumbers**2, np.log(wavenumbers))
+        slopes = power * wavenumbers**4
+        smoothed = slopes * np.exp(-((wavenumbers * width) ** 2))
+        whole += float(np.trapezoid(slopes, np.log(wavenumbers)))
+        left += float(np.trapezoid(smoothed, np.log(wavenumbers)))
+    return left / whole
 
 
 class _Axis:
@@ -184,12 +234,14 @@ def _power(
     correlation_length: float,
     spectrum: Spectrum,
     inner_cutoff: float,
+    hurst: float,
 ) -> Float[np.ndarray, "*waves"]:
     scaled = wavenumber_squared * correlation_length**2
     if spectrum == "gaussian":
         return np.exp(-scaled / 4)
     smooth = np.exp(-wavenumber_squared * inner_cutoff**2 / 4)
-    return smooth * (1 + scaled) ** (-(dimensions + 1) / 2)
+    order = 0.5 if spectrum == "exponential" else hurst
+    return smooth * (1 + scaled) ** (-(dimensions + 2 * order) / 2)
 
 
 def _check(rms: float, correlation_length: float, spectrum: Spectrum, inner_cutoff: float) -> None:
@@ -197,8 +249,8 @@ def _check(rms: float, correlation_length: float, spectrum: Spectrum, inner_cuto
         raise ValueError(f"rms = {rms} m must be zero or more; give a height")
     if not (math.isfinite(correlation_length) and correlation_length > 0):
         raise ValueError(f"correlation_length = {correlation_length} m must be positive")
-    if spectrum == "exponential" and not (math.isfinite(inner_cutoff) and inner_cutoff > 0):
+    if spectrum != "gaussian" and not (math.isfinite(inner_cutoff) and inner_cutoff > 0):
         raise ValueError(
-            f"inner_cutoff = {inner_cutoff} m must be positive: an exponential spectrum has "
+            f"inner_cutoff = {inner_cutoff} m must be positive: such a spectrum ({spectrum}) has "
             "unbounded slopes; give the length below which the surface is smooth"
         )

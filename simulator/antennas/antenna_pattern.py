@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas.field_pattern import field_gain, horn_beam_sigma
+from simulator.antennas.polarization import VERTICAL, Polarization
 
 ABRUPT = 0.05
 """Angle before the edge of the half space where a cosine's pattern is taken to end abruptly: there
@@ -19,6 +20,7 @@ class AntennaPattern:
 
     antenna: Antenna
     aim: Float[np.ndarray, " 3"]  # unit vector
+    polarization: Polarization = VERTICAL
 
     def __call__(
         self,

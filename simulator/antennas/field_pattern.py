@@ -1,8 +1,8 @@
 """Antenna patterns: real field amplitude over direction, relative to isotropic (0 dBi).
 
 A pattern has a main beam that is rotationally symmetric about the antenna's aim and does not
-vary with frequency; polarization is a matter of the path (vertical, along z, unless told
-otherwise). In two dimensions directions have z = 0.
+vary with frequency; polarization is that of :mod:`simulator.antennas.polarization`. In two
+dimensions directions have z = 0.
 """
 
 import math

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
+from simulator.antennas.polarization import VERTICAL, Polarization
+
 Pattern = Callable[
     [Float[np.ndarray, "facets 3"], Float[np.ndarray, " facets"], Float[np.ndarray, " nodes"]],
     Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"],
@@ -22,6 +24,7 @@ class Ports:
     pattern: Pattern
     visible: Bool[np.ndarray, "ports facets"]
     nodes: int = 1  # frequencies that the pattern has to be sampled at
+    polarization: Polarization = VERTICAL  # in two dimensions the field is along z
 
 
 def isotropic(

@@ -3,17 +3,44 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from scenes.realisations.object_surface import Surface
 from scenes.schema.radio import Polarization
+from scenes.surfaces.roughness_spectrum import slope_share
 from simulator.geometry.profile_lines import Edge, Run, outline
 from simulator.materials.layered_media import Conductor, Material
 
+SMOOTHED = 1 / 6
+"""Standard width, over the wavelength, of the smoothing of slopes whose curvature counts. [-]"""
+
 CELLS_AT_ONCE = 1_000_000
 """Cells of a surface that are made facets in one go: some 300 MB. [-]"""
+
+
+class Group(NamedTuple):
+    """Facets that reflect alike."""
+
+    material: Material
+    share: float | None  # of the slopes' variance that smoothing leaves; None: smooth [-]
+    mask: Bool[np.ndarray, " facets"] | None  # which they are; None: all
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relief:
+    """How facets lie on the mean surface of a rough body."""
+
+    normals: Float32[np.ndarray, "facets 3"]  # unit vectors of the mean surface
+    heights: Float32[np.ndarray, " facets"]  # of the facets' centres over it [m]
+    shares: tuple[float | None, ...]
+    """Of the slopes' variance, what smoothing leaves, by material; None: it is smooth. [-]"""
+
+    def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Relief":
+        """Choose some of the facets."""
+        return replace(self, normals=self.normals[chosen], heights=self.heights[chosen])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +58,22 @@ class Facets:
     runs: tuple[Run, ...] = ()  # of lines: what lies in one course
     corners: tuple[Edge, ...] = ()  # of lines: where such courses end
     polarization: Polarization = "vertical"  # of lines
+    relief: "Relief | None" = None  # None: facets are where the mean surface is
 
     @property
     def places(self) -> Float[np.ndarray, "facets 3"]:
         """Where rays start: a surface does not hide itself by its own roughness. [m]."""
+        if self.relief is not None:
+            places: np.ndarray = self.centres - self.relief.heights[:, None] * self.relief.normals
+            return places
         return self.centres if self.mean_centres is None else self.mean_centres
+
+    @property
+    def mean_normals(self) -> Float[np.ndarray, "facets 3"]:
+        """Unit vectors of the mean surface; outward where one-sided."""
+        if self.relief is None:
+            return self.normals
+        return self.relief.normals.astype(np.float64)
 
     @cached_property
     def rough(self) -> Bool[np.ndarray, " facets"]:
@@ -67,6 +105,7 @@ class Facets:
             edges=self.edges[chosen],
             two_sided=self.two_sided[chosen],
             material=None if self.material is None else self.material[chosen],
+            relief=None if self.relief is None else self.relief.part(chosen),
         )
 
     @property
@@ -80,20 +119,31 @@ class Facets:
         return int(self.edges.shape[1]) == 1
 
     @property
-    def by_material(self) -> tuple[tuple[Material, Bool[np.ndarray, " facets"] | None], ...]:
-        """Each material that occurs, and which facets are of it; None: all."""
+    def by_material(self) -> tuple[Group, ...]:
+        """Facets that reflect alike: of one material, and smooth or equally rough."""
+        shares = self._shares
         if self.material is None:
-            return ((self.materials[0], None),)
-        kinds: list[tuple[Material, list[int]]] = []
-        for index, material in enumerate(self.materials):
-            same = [k for k in kinds if k[0] is material or _both_conduct(k[0], material)]
+            return (Group(self.materials[0], shares[0], None),)
+        kinds: list[tuple[Material, float | None, list[int]]] = []
+        for index, (material, share) in enumerate(zip(self.materials, shares, strict=True)):
+            same = [
+                k
+                for k in kinds
+                if k[1] == share and (k[0] is material or _both_conduct(k[0], material))
+            ]
             if same:
-                same[0][1].append(index)
+                same[0][2].append(index)
             else:
-                kinds.append((material, [index]))
+                kinds.append((material, share, [index]))
         if len(kinds) == 1:
-            return ((kinds[0][0], None),)
-        return tuple((material, np.isin(self.material, which)) for material, which in kinds)
+            return (Group(kinds[0][0], kinds[0][1], None),)
+        return tuple(Group(kind, share, np.isin(self.material, i)) for kind, share, i in kinds)
+
+    @property
+    def _shares(self) -> tuple[float | None, ...]:
+        if self.relief is None:
+            return (None,) * len(self.materials)
+        return self.relief.shares
 
 
 def _both_conduct(one: Material, other: Material) -> bool:
@@ -105,6 +155,7 @@ def surface_facets(
     material: Material | None = None,
     *,
     polarization: Polarization = "vertical",
+    wavelength: float = 0.0,
 ) -> Facets:
     """Make a facet of each cell of a surface (line cells: 2-D, triangles: 3-D).
 
@@ -116,14 +167,19 @@ def surface_facets(
         What all of it is made of; by default a conductor.
     polarization
         Of the antennas, where these are lines.
+    wavelength
+        See :func:`scene_facets`. [m]
     """
     of = Conductor() if material is None else material
-    made = scene_facets([(surface, of)], polarization=polarization)
+    made = scene_facets([(surface, of)], polarization=polarization, wavelength=wavelength)
     return replace(made, material=None)
 
 
 def scene_facets(
-    surfaces: Sequence[tuple[Surface, Material]], *, polarization: Polarization = "vertical"
+    surfaces: Sequence[tuple[Surface, Material]],
+    *,
+    polarization: Polarization = "vertical",
+    wavelength: float = 0.0,
 ) -> Facets:
     """Make facets of the cells of several surfaces, one material for each of them.
 
@@ -133,6 +189,9 @@ def scene_facets(
         At least one, all lines or all triangles, and what each is made of.
     polarization
         Of the antennas, where these are lines.
+    wavelength
+        Of the middle of the band: slopes shorter than a sixth of it do not count as curvature;
+        0: all do. [m]
     """
     sides = surfaces[0][0].cells.shape[1] - 1
     ends = np.cumsum([len(surface.cells) for surface, _ in surfaces])
@@ -170,7 +229,7 @@ def scene_facets(
             cells = surface.cells[first - start : last - start]
             _fill(facets, slice(first, last), surface.vertices[cells])
     if mean_centres is None:
-        return facets
+        return replace(facets, relief=_relief([one for one, _ in surfaces], count, wavelength))
     return replace(facets, mean_centres=mean_centres, runs=tuple(runs), corners=tuple(corners))
 
 
@@ -184,6 +243,41 @@ def _renumbered(corners: Sequence[Edge], *, facets: int, edges: int) -> list[Edg
         )
         for edge in corners
     ]
+
+
+def is_rough(surface: Surface) -> bool:
+    """Tell whether a surface leaves its mean shape."""
+    return surface.vertices is not surface.mean_vertices and bool(
+        np.any(surface.vertices != surface.mean_vertices)
+    )
+
+
+def _relief(surfaces: Sequence[Surface], count: int, wavelength: float) -> Relief | None:
+    """Compare triangles with their mean surfaces; None if all are smooth."""
+    rough = [is_rough(surface) for surface in surfaces]
+    if not any(rough):
+        return None
+    relief = Relief(
+        normals=np.empty((count, 3), dtype=np.float32),
+        heights=np.zeros(count, dtype=np.float32),
+        shares=tuple(
+            slope_share(surface.roughness, SMOOTHED * wavelength) if is_rough else None
+            for surface, is_rough in zip(surfaces, rough, strict=True)
+        ),
+    )
+    start = 0
+    for surface in surfaces:
+        for first in range(0, len(surface.cells), CELLS_AT_ONCE):
+            cells = surface.cells[first : first + CELLS_AT_ONCE]
+            mean, corners = surface.mean_vertices[cells], surface.vertices[cells]
+            across = np.cross(mean[:, 1] - mean[:, 0], mean[:, 2] - mean[:, 0])
+            normals = across / np.linalg.norm(across, axis=-1, keepdims=True)
+            some = slice(start + first, start + first + len(cells))
+            relief.normals[some] = normals
+            apart = (corners - mean).mean(axis=1)
+            relief.heights[some] = np.einsum("fx,fx->f", apart, normals)
+        start += len(surface.cells)
+    return relief
 
 
 def _fill(facets: Facets, some: slice, corners: Float[np.ndarray, "cells corners 3"]) -> None:
@@ -219,6 +313,7 @@ def joined(parts: Sequence[Facets]) -> Facets:
         for start, part in zip(first, parts, strict=False)
     ]
     return Facets(
+        relief=_joined_reliefs(parts),
         centres=np.concatenate([part.centres for part in parts]),
         normals=np.concatenate([part.normals for part in parts]),
         sizes=np.concatenate([part.sizes for part in parts]),
@@ -230,6 +325,25 @@ def joined(parts: Sequence[Facets]) -> Facets:
         runs=tuple(runs),
         corners=tuple(corners),
         polarization=polarizations.pop(),
+    )
+
+
+def _joined_reliefs(parts: Sequence[Facets]) -> Relief | None:
+    if all(part.relief is None for part in parts):
+        return None
+    made = [
+        part.relief
+        or Relief(
+            normals=part.normals.astype(np.float32),
+            heights=np.zeros(part.count, dtype=np.float32),
+            shares=(None,) * len(part.materials),
+        )
+        for part in parts
+    ]
+    return Relief(
+        normals=np.concatenate([relief.normals for relief in made]),
+        heights=np.concatenate([relief.heights for relief in made]),
+        shares=tuple(share for relief in made for share in relief.shares),
     )
 
 

@@ -32,6 +32,7 @@ class Patches:
     offsets: Float32[np.ndarray, "facets 3"]  # centroids [m]
     edges: Float32[np.ndarray, "facets 2 3"]  # [m]
     one_sided: np.ndarray  # bool [facets]
+    mean: Float32[np.ndarray, "facets 3"] | None = None  # normals of the mean surface, if rough
 
     def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Patches":
         """Choose some of the triangles, by their place in the order; empty patches go."""
@@ -46,6 +47,7 @@ class Patches:
             offsets=self.offsets[chosen],
             edges=self.edges[chosen],
             one_sided=self.one_sided[chosen],
+            mean=None if self.mean is None else self.mean[chosen],
         )
 
     def patch_range(self, start: int, stop: int) -> "Patches":
@@ -97,4 +99,5 @@ def cut_into_patches(facets: Facets, chosen: Int[np.ndarray, " chosen"], side: f
         offsets=offsets.astype(np.float32),
         edges=facets.edges[order].astype(np.float32),
         one_sided=~facets.two_sided[order],
+        mean=None if facets.relief is None else facets.relief.normals[order],
     )

@@ -187,7 +187,7 @@ def facets_visible(
         visible[:] = True
         return visible
     points = rays.about_centre(points)
-    centres, normals = _double(rays.about_centre(facets.places)), _double(facets.normals)
+    centres, normals = _double(rays.about_centre(facets.places)), _double(facets.mean_normals)
     chunk = max(1, RAYS_AT_ONCE // facets.count)
     for first in range(0, len(points), chunk):
         some = points[first : first + chunk]

@@ -1,4 +1,4 @@
-r"""What facets reflect: Fresnel coefficients at the half angle, between vertical antennas.
+r"""What facets reflect: Fresnel coefficients at the half angle, between polarized antennas.
 
 Seen from both of its ends, a facet acts as the mirror that would lead from one to the other:
 its angle of incidence is half the angle between the legs, :math:`\cos\vartheta =
@@ -8,16 +8,18 @@ both legs alike, so that the link stays reciprocal. An echo to where it came fro
 reflected as at normal incidence, by the little mirrors that face the antenna.
 
 In two dimensions the electric field is along z, across the plane of incidence (TE), or the magnetic
-one is (TM). In three, the
-antennas' vertical fields are split at that mirror,
+one is (TM). In three, the antennas' fields :math:`\hat e` are split at that mirror,
 
 .. math:: \Gamma = (\hat e_r \cdot \hat s)(\hat s \cdot \hat e_t)\, \Gamma_{TE}
                  + (\hat e_r \cdot \hat p_r)(\hat p_t \cdot \hat e_t)\, \Gamma_{TM}
 
-with :math:`\hat s` across both legs and :math:`\hat p = \hat k \times \hat s`.
+with :math:`\hat s` across both legs and :math:`\hat p = \hat k \times \hat s`. The shares'
+difference, what a conductor reflects, is :math:`2 (\hat m \cdot \hat e_t)(\hat m \cdot \hat e_r)
+- \hat e_t \cdot \hat e_r` with the mirror's normal :math:`\hat m`: smooth also where the legs are
+one, and the shares themselves do not matter.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -26,6 +28,7 @@ from scenes.schema.radio import Polarization as Polarization2D
 from simulator.materials.layered_media import Coefficients, Conductor, Material, reflection
 from simulator.materials.permittivity import MaterialError
 from simulator.numerics.nufft_sum import ACCURACY, barycentric_basis, chebyshev_nodes
+from simulator.numerics.vectors import Vector, at_least, cross, dot
 
 NODE_COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192)
 """Frequencies that a coefficient may be sampled at; the fewest that do are taken."""
@@ -39,15 +42,24 @@ STEEP = 0.1
 ANGLE_CLASSES = (0.02, 0.05, STEEP, 0.2, 0.35, 0.5, 0.7, 0.85)
 """Most grazing cosines that links are sorted by, each with its number of nodes. [-]"""
 
-RETURNING = 1e-10
+LEAST_TURN = 1e-12
 """Squared sine between the legs below which they are one: TE and TM are then the same. [-]"""
 
 
-class Polarization(NamedTuple):
-    """Share of a vertical link that each polarization carries, with its sign."""
+class Legs(NamedTuple):
+    """Unit vectors from facets to both antennas, and their fields' vectors, by axis."""
 
-    te: Float[np.ndarray, " facets"]
-    tm: Float[np.ndarray, " facets"]
+    transmit: Vector
+    receive: Vector
+    sent: Vector
+    received: Vector
+
+
+class Shares(NamedTuple):
+    """Share of a link that each polarization carries, with its sign."""
+
+    te: Any
+    tm: Any
 
 
 def half_angle_cosine(
@@ -58,27 +70,22 @@ def half_angle_cosine(
     return np.asarray(np.minimum(0.5 * np.sqrt(np.einsum("fx,fx->f", both, both)), 1.0))
 
 
-def vertical_polarization(
-    transmit: Float[np.ndarray, "facets 3"], receive: Float[np.ndarray, "facets 3"]
-) -> Polarization:
-    """Split the link of two vertical antennas at the mirror between them.
+def mirror_shares(legs: Legs) -> Shares:
+    """Split links at the mirror between their legs. [-].
 
-    Parameters
-    ----------
-    transmit, receive
-        Unit vectors from the facet to the antennas.
+    For arrays of NumPy and Dr.Jit alike.
     """
-    along = np.einsum("fx,fx->f", transmit, receive)
-    z_t, z_r = transmit[:, 2], receive[:, 2]
-    turn = 1.0 - along**2
-    across = receive[:, 0] * transmit[:, 1] - receive[:, 1] * transmit[:, 0]
-    # A vertical antenna has no field along its own axis.
-    upright = np.sqrt((1.0 - z_t**2).clip(0.0) * (1.0 - z_r**2).clip(0.0))
-    scale = np.divide(1.0, turn * upright, out=np.zeros_like(turn), where=turn * upright > 0)
-    one_way = turn <= RETURNING
-    te = np.where(one_way, np.where(upright > 0, 1.0, 0.0), across**2 * scale)
-    tm = np.where(one_way, 0.0, (z_r - z_t * along) * (z_t - z_r * along) * scale)
-    return Polarization(te=te, tm=tm)
+    across = cross(legs.receive, legs.transmit)
+    turn = dot(across, across)
+    te = dot(legs.received, across) * dot(legs.sent, across) / at_least(turn, LEAST_TURN)
+    return Shares(te=te, tm=conductor_mirror(legs) + te)
+
+
+def conductor_mirror(legs: Legs) -> Any:
+    """Reflect links at the conducting mirror between their legs. [-]."""
+    squared = at_least(1.0 + dot(legs.transmit, legs.receive), LEAST_TURN)  # half of |q|²
+    product = dot(legs.receive, legs.sent) * dot(legs.transmit, legs.received)
+    return product / squared - dot(legs.sent, legs.received)
 
 
 def facet_coefficients(
@@ -87,7 +94,7 @@ def facet_coefficients(
     receive: Float[np.ndarray, "facets 3"],
     frequencies: Float[np.ndarray, " nodes"],
     *,
-    flat: bool,
+    fields: tuple[Float[np.ndarray, "facets 3"], Float[np.ndarray, "facets 3"]] | None,
     polarization: Polarization2D = "vertical",
 ) -> Float[np.ndarray, "1 facets"] | Complex[np.ndarray, "nodes facets"]:
     """Reflection coefficient of each facet at each frequency; one row if it does not vary.
@@ -100,20 +107,21 @@ def facet_coefficients(
         Unit vectors from the facets to the antennas.
     frequencies
         Any grid. [Hz]
-    flat
-        Two dimensions.
+    fields
+        Vectors of the fields of both antennas there; None in two dimensions.
     polarization
         Of the antennas, in two dimensions: the electric field is along z, or the magnetic one.
     """
-    if isinstance(material, Conductor):
-        if flat:
+    if fields is None:
+        if isinstance(material, Conductor):
             return np.full((1, len(transmit)), -1.0 if polarization == "vertical" else 1.0)
-        shares = vertical_polarization(transmit, receive)
-        return np.asarray(shares.tm - shares.te)[None]
-    both = over_angles(material, frequencies, half_angle_cosine(transmit, receive))
-    if flat:
+        both = over_angles(material, frequencies, half_angle_cosine(transmit, receive))
         return both.te if polarization == "vertical" else both.tm
-    shares = vertical_polarization(transmit, receive)
+    legs = Legs(transmit.T, receive.T, fields[0].T, fields[1].T)
+    if isinstance(material, Conductor):
+        return np.asarray(conductor_mirror(legs))[None]
+    both = over_angles(material, frequencies, half_angle_cosine(transmit, receive))
+    shares = mirror_shares(legs)
     return np.asarray(shares.te * both.te + shares.tm * both.tm)
 
 

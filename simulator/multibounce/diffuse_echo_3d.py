@@ -25,9 +25,11 @@ from jaxtyping import Bool, Complex, Float, Int
 from scipy.constants import speed_of_light
 from scipy.spatial import KDTree
 
-from simulator.antennas.antenna_pattern import ISOTROPIC
+from scenes.schema.antenna import Isotropic
+from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.links import Links
+from simulator.antennas.polarization import Polarization
 from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches
@@ -117,17 +119,21 @@ class _Target:
         """Sum diffuse-coherent echoes over two legs, both ways for equal ends, and diffuse ones."""
         frequencies = self.scene.scenario.radio.frequencies
         echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
-        ends = np.stack([one.leg.image(send).centre, other.image(receive).centre])
+        images = one.leg.image(send), other.image(receive)
+        ends = np.stack([image.centre for image in images])
         centre = self._centre(ends[0], ends[1])
         if centre is None:
             return echo
-        there = AntennaGroup(positions=centre[None], pattern=ISOTROPIC)
+        # What arrives there is measured along the field of the antenna's image.
+        there, on_return = (
+            AntennaGroup(positions=centre[None], pattern=_probe(image)) for image in images
+        )
         coherent = self._coherent(other, receive, centre)
         partners = [
             two
             for two in partners
             if facets_within_reach(
-                self.scene, two, two.before.image(receive), two.after.image(there)
+                self.scene, two, two.before.image(receive), two.after.image(on_return)
             ).size
         ]
         if coherent is None and not partners:
@@ -137,7 +143,8 @@ class _Target:
         )
         if places.size == 0:
             return echo
-        answer = self._answer(one, places, centre, ends)
+        fields = there.pattern, images[1].pattern
+        answer = self._answer(one, places, centre, ends, fields)
         wave = self._wave(one, send, there, answer)
         if coherent is not None:
             echo += (2.0 if send is receive else 1.0) * wave * coherent
@@ -146,10 +153,11 @@ class _Target:
                 other_wave, reference = wave, answer.reference
             else:
                 places = facets_within_reach(
-                    self.scene, two, two.before.image(receive), two.after.image(there)
+                    self.scene, two, two.before.image(receive), two.after.image(on_return)
                 )
-                back = self._answer(two, places, centre, ends[::-1])
-                other_wave = self._wave(two, receive, there, back)
+                fields = on_return.pattern, images[0].pattern
+                back = self._answer(two, places, centre, ends[::-1], fields)
+                other_wave = self._wave(two, receive, on_return, back)
                 reference = answer.reference
             echo += wave * other_wave / reference
         return echo
@@ -216,7 +224,14 @@ class _Target:
             return None
         chain = unfolded_chain(self.mirrors, leg.sequence, image.positions, centre[None])
         wave = direct_wave(lengths, frequencies, waves="spherical")
-        wave *= reflected_field(self.mirrors, chain, frequencies)
+        # The scattering centre stands for a target that answers the field of the antenna's image.
+        wave *= reflected_field(
+            self.mirrors,
+            chain,
+            frequencies,
+            sent=sight.pattern.polarization,
+            at_place=image.pattern.polarization,
+        )
         return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)
 
     def _answer(
@@ -225,6 +240,7 @@ class _Target:
         some: Int[np.ndarray, " some"],
         centre: Float[np.ndarray, " 3"],
         ends: Float[np.ndarray, "2 3"],
+        fields: tuple[AntennaPattern, AntennaPattern],
     ) -> "_Answer":
         """Work out the target's amplitudes from places on a rough mirror to one end."""
         frequencies = self.scene.scenario.radio.frequencies
@@ -242,8 +258,8 @@ class _Target:
             float(np.sqrt(width[-1] * width[-2] / MOST_PLACES)),
         )
         tiles = cut_into_patches(self.scene.facets.part(some), np.arange(len(some)), side)
-        amplitudes = self._amplitudes(seen_as(tiles.centres), ends[1], centre)
-        specular = self._amplitudes(ends[:1], ends[1], centre)[0]
+        amplitudes = self._amplitudes(seen_as(tiles.centres), ends[1], centre, fields)
+        specular = self._amplitudes(ends[:1], ends[1], centre, fields)[0]
         level = np.sqrt(np.mean(np.abs(amplitudes) ** 2, axis=0))
         reference = np.exp(1j * np.angle(specular)) * np.maximum(np.abs(specular), level)
         return _Answer(
@@ -259,6 +275,7 @@ class _Target:
         places: Float[np.ndarray, "places 3"],
         end: Float[np.ndarray, " 3"],
         centre: Float[np.ndarray, " 3"],
+        fields: tuple[AntennaPattern, AntennaPattern],
     ) -> Complex[np.ndarray, "places freqs"]:
         """Sum the target's facets from places to one end, over the links with the centre. [-]."""
         frequencies, facets = self.scene.scenario.radio.frequencies, self.facets
@@ -266,8 +283,8 @@ class _Target:
         links = Links(
             senders=np.broadcast_to(end, places.shape),
             receivers=places,
-            sent=ISOTROPIC,
-            received=ISOTROPIC,
+            sent=_isotropic(fields[1].polarization),
+            received=_isotropic(_as_source(fields[0].polarization)),
         )
         amplitudes: np.ndarray = scattered_by_patches(
             facets,
@@ -280,6 +297,20 @@ class _Target:
             ways = np.linalg.norm(sources - centre, axis=-1)
             amplitudes = amplitudes / direct_wave(ways, frequencies, waves="spherical")
         return amplitudes
+
+
+def _as_source(probe: Polarization) -> Polarization:
+    """Polarization of a source whose field a probe measures: its rays go on as the probe's end."""
+    return Polarization(axis=probe.axis, cross_polar=-probe.cross_polar)
+
+
+def _isotropic(polarization: Polarization) -> AntennaPattern:
+    return AntennaPattern(Isotropic(), np.array([0.0, 1.0, 0.0]), polarization)
+
+
+def _probe(image: AntennaGroup) -> AntennaPattern:
+    """Make an isotropic antenna that receives the field of an antenna's image."""
+    return _isotropic(_as_source(image.pattern.polarization))
 
 
 def _turned_back(leg: Leg, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

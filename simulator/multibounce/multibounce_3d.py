@@ -11,8 +11,8 @@ targets the later one is cut into facets, and the other one is a mirror. What no
 The diffuse part is that of :mod:`simulator.multibounce.diffuse_echo_3d`.
 
 What is neglected: which part of a target a leg lights is found patch by patch, from one facet of
-each; the antennas' vertical field stays vertical at the target; chains of two targets of which the
-earlier is curved.
+each; of what comes over mirrors to the target, the part across the field of the antenna's image;
+chains of two targets of which the earlier is curved.
 """
 
 from dataclasses import dataclass
@@ -227,7 +227,13 @@ def _over_mirrors_alone(
         chain = unfolded_chain(
             mirrors, leg.sequence, image.positions[some], receive.positions[some], paired=True
         )
-        field = reflected_field(mirrors, chain, frequencies)
+        field = reflected_field(
+            mirrors,
+            chain,
+            frequencies,
+            sent=send.pattern.polarization,
+            received=receive.pattern.polarization,
+        )
         wave = direct_wave(lengths[some], frequencies, waves="spherical")
         echo[some] += (shares * gains[some])[:, None] * field * wave
     return echo

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex
 
+from simulator.antennas.polarization import antenna_polarization
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets
 from simulator.geometry.ray_scene import facets_visible
@@ -91,6 +92,7 @@ def _link_by_link(
                 positions=places[index, None],
                 pattern=antenna_pattern(antenna, aims[index]),
                 visible=facets_visible(scene.rays, facets, places[index, None]),
+                polarization=antenna_polarization(antenna, aims[index]),
             )
             for places, antenna, aims in ends
         )

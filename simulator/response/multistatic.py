@@ -1,8 +1,8 @@
 """The echo between antennas that stand by themselves, in three dimensions.
 
 Plates are cut into tiles, so that the facets of a rough one never have to be in memory at once;
-what neither antenna's pattern illuminates is left out. A tile is seen as a whole from where it
-cannot shade itself; else rays are traced, among the tile and its surroundings.
+what neither antenna's pattern illuminates is left out. A plate does not hide itself by its own
+roughness; rays are traced among the mean surfaces of everything else.
 """
 
 import math
@@ -12,12 +12,14 @@ from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
+from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface, object_surface
-from scenes.realisations.plate_tiles import PlateSheet, Tile, plate_sheet
+from scenes.realisations.plate_tiles import plate_sheet
 from scenes.scenario import Scenario
 from scenes.schema.antenna import Antenna
 from scenes.schema.objects import Plate
+from simulator.antennas.polarization import antenna_polarization
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, surface_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
@@ -44,9 +46,6 @@ FEW_FREQUENCIES = 64
 
 MASKS_KEPT = 2
 """Places from which it is remembered what is seen: the transmitter's and the last receiver's."""
-
-LOWEST_VIEW = math.tan(math.radians(2.0))
-"""Slope of view down to which all shadows on a rough plate are found; they are longer below."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +85,7 @@ def multistatic_scene(scenario: Scenario, *, seed: int, sample: int) -> Multista
     )
     radio = RadioScene(
         scenario=scenario,
-        rays=build_scene([*_mean_plates(scenario), *shaped]),
+        rays=build_scene([*_mean_plates(scenario), *shaped], mean=True),
         facets=None,
         elements=true_elements(scenario, seed=seed, sample=sample),
     )
@@ -161,19 +160,6 @@ class _Part:
     material: Material
     rays: RayScene  # what hides it, but for a plate's own facets
     ball: tuple[Float[np.ndarray, " 3"], float] | None  # around it; None: unknown
-    sheet: PlateSheet | None = None
-    tile: Tile | None = None
-    steepest: float = math.inf  # of the plate's facets [-]
-    surroundings: tuple[Surface, ...] = ()  # the surfaces in ``rays``
-
-    def own_shadows(self, place: Float[np.ndarray, " 3"]) -> bool:
-        """Tell whether facets of a plate's tile may hide each other from a place."""
-        if self.sheet is None or self.tile is None:
-            return False  # the rays meet all of it
-        offset = place - self.tile.centre
-        height = float(offset @ self.sheet.plate.normal)
-        aside = float(np.linalg.norm(offset - height * self.sheet.plate.normal)) + self.tile.radius
-        return abs(height) - self.sheet.highest <= self.steepest * aside
 
 
 class _PartSums:
@@ -184,7 +170,6 @@ class _PartSums:
         self._surface: Surface | None = None
         self._kernel: BistaticKernel | None = None
         self._facets: Facets | None = None
-        self._close: RayScene | None = None
         self._seen: dict[bytes, Bool[np.ndarray, " facets"] | None] = {}
 
     def __call__(self, link: _Link) -> Complex[np.ndarray, " freqs"]:
@@ -209,7 +194,8 @@ class _PartSums:
     @property
     def facets(self) -> Facets:
         if self._facets is None:
-            self._facets = surface_facets(self.surface, self.part.material)
+            middle = 2 * speed_of_light / float(self.frequencies[0] + self.frequencies[-1])
+            self._facets = surface_facets(self.surface, self.part.material, wavelength=middle)
         return self._facets
 
     def _seen_from(self, end: _End) -> Bool[np.ndarray, " facets"] | None:
@@ -219,17 +205,8 @@ class _PartSums:
             self._seen[key] = self._seen.pop(key)  # the transmitter's stays the latest
             return self._seen[key]
         mask: Bool[np.ndarray, " facets"] | None = None
-        part = self.part
-        if part.own_shadows(place):
-            assert part.sheet is not None
-            assert part.tile is not None
-            if self._close is None:
-                margin = 2 * part.sheet.highest / LOWEST_VIEW
-                close = part.sheet.surface(part.tile, margin=margin)
-                self._close = build_scene([*part.surroundings, close])
-            mask = facets_visible(self._close, self.facets, place[None])[0]
-        elif part.rays.objects:
-            mask = facets_visible(part.rays, self.facets, place[None])[0]
+        if self.part.rays.objects:
+            mask = facets_visible(self.part.rays, self.facets, place[None])[0]
         if len(self._seen) >= MASKS_KEPT:
             del self._seen[next(iter(self._seen))]
         self._seen[key] = mask
@@ -244,6 +221,7 @@ class _PartSums:
                 positions=end.port.position[None],
                 pattern=antenna_pattern(end.antenna, end.port.aim),
                 visible=(everything if mask is None else mask)[None],
+                polarization=end.port.polarization,
             )
             for end, mask in zip(link.ends, seen, strict=True)
         )
@@ -265,7 +243,15 @@ def _links(scene: MultistaticScene) -> list[_Link]:
         pattern = pattern_table(antenna)
         ends.append(
             [
-                _End(port=Port(position=place, aim=aim, pattern=pattern), antenna=antenna)
+                _End(
+                    port=Port(
+                        position=place,
+                        aim=aim,
+                        pattern=pattern,
+                        polarization=antenna_polarization(antenna, aim),
+                    ),
+                    antenna=antenna,
+                )
                 for place, aim in zip(places, aims, strict=True)
             ]
         )
@@ -293,20 +279,15 @@ def _parts(scene: MultistaticScene) -> Iterator[tuple[_Part, tuple[float, float]
             )
             yield part, (place, len(names))
             continue
-        around = scene.around(name)
-        rays = build_scene(around)
+        rays = build_scene(scene.around(name), mean=True)
         sheet = plate_sheet(scenario, name, seed=scene.seed, sample=scene.sample)
-        steepest, tiles = sheet.steepest, list(sheet.tiles(TILE_CELLS))
+        tiles = list(sheet.tiles(TILE_CELLS))
         for number, tile in enumerate(tiles):
             part = _Part(
                 surface=partial(sheet.surface, tile),
                 material=material,
                 rays=rays,
                 ball=(tile.centre, tile.radius + sheet.highest),
-                sheet=sheet,
-                tile=tile,
-                steepest=steepest,
-                surroundings=tuple(around),
             )
             yield part, (place * len(tiles) + number, len(names) * len(tiles))
 

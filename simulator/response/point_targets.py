@@ -4,6 +4,8 @@ r"""What ideal points scatter: the radar equation, each leg tested for occlusion
 
 Points see neither each other nor the mirrors: only the direct ways count. They are no surfaces, and
 what they return is no bounce: it is there with ``max_bounces = 0``, too.
+They keep the polarization: between antennas of different ones, the cosine of the angle between
+their axes counts.
 """
 
 from typing import NamedTuple
@@ -15,11 +17,13 @@ from scipy.constants import speed_of_light
 from scenes.scenario import User
 from scenes.schema.antenna import Antenna
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.polarization import antenna_polarization
 from simulator.geometry.ray_scene import blocked
 from simulator.scene.radio_scene import RadioScene
 
 
 class _Leg(NamedTuple):
+    axis: Float[np.ndarray, " 3"]  # of the antenna's polarization
     gains: Float[np.ndarray, " places"]  # of the antenna, 0 where the point is hidden [-]
     distances: Float[np.ndarray, " places"]  # [m]
 
@@ -80,7 +84,9 @@ def _leg(
     distances = np.linalg.norm(towards, axis=-1)
     gains = field_gain(antenna, aims, towards / distances[:, None])
     hidden = blocked(scene.rays, places, np.broadcast_to(point, places.shape))
-    return _Leg(np.where(hidden, 0.0, gains), distances)
+    return _Leg(
+        antenna_polarization(antenna, aims[0]).axis, np.where(hidden, 0.0, gains), distances
+    )
 
 
 def _link(
@@ -88,7 +94,8 @@ def _link(
 ) -> Complex[np.ndarray, "elements freqs"]:
     frequencies = scene.scenario.radio.frequencies
     wavelengths = speed_of_light / frequencies
-    spread = outward.gains * back.gains / (outward.distances * back.distances)
+    match = float((outward.axis * back.axis).sum())
+    spread = match * outward.gains * back.gains / (outward.distances * back.distances)
     amplitude = wavelengths * np.sqrt(cross_section) / (4 * np.pi) ** 1.5
     turns = (outward.distances + back.distances)[:, None] / wavelengths
     phase = np.exp(-2j * np.pi * np.remainder(turns, 1.0))

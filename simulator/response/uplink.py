@@ -4,11 +4,12 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from jaxtyping import Complex
+from jaxtyping import Complex, Float
 
 from scenes.scenario import User
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.polarization import antenna_polarization
 from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import blocked
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
@@ -102,9 +103,23 @@ def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freq
     gains = gains * field_gain(
         station.antenna, scenario.aim(station.antenna, elements.mean(axis=0)), -directions
     )
+    if scenario.dimensions == 3:
+        gains = gains * _polarization_match(scene, user, directions)
     seen = in_line_of_sight(scene.rays, user.position, elements)
     wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)
     return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)
+
+
+def _polarization_match(
+    scene: RadioScene, user: User, directions: Float[np.ndarray, "elements 3"]
+) -> Float[np.ndarray, " elements"]:
+    """Part of the user's field that the array receives. [-]."""
+    scenario, station = scene.scenario, scene.scenario.base_station
+    middle = scene.elements.mean(axis=0)
+    sent = antenna_polarization(user.antenna, scenario.aim(user.antenna, user.position))
+    received = antenna_polarization(station.antenna, scenario.aim(station.antenna, middle))
+    product = sent.field(directions) * received.field(-directions)
+    return np.asarray(product.sum(axis=-1))
 
 
 def _over_mirrors(
@@ -135,6 +150,8 @@ def _over_mirrors(
         (1, len(array.positions)),
         transmit=sender.pattern.towards,
         receive=array.pattern.towards,
+        sent=sender.pattern.polarization,
+        received=array.pattern.polarization,
     )
     return np.asarray(response[0])
 

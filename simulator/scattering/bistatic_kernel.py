@@ -21,11 +21,23 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from scenes.schema.antenna import Antenna, Isotropic
+from scenes.surfaces.roughness_spectrum import slope_share
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.polarization import VERTICAL, Polarization, field_vector
+from simulator.geometry.facets import SMOOTHED, is_rough
 from simulator.materials.layered_media import Conductor, Material, reflection
+from simulator.materials.reflection_coefficients import Legs, mirror_shares
 from simulator.scattering.triangle_transform import triangle_transform
+from simulator.scattering.weighted_curvature import (
+    curvature_weight,
+    middle_permittivity,
+    scattering_kernel,
+)
 
 mi.set_variant(engine.mitsuba_variant())
+
+Complex2f: Any = mi.Complex2f
+Complex2d: Any = mi.Complex2d
 
 FREQUENCIES_AT_ONCE = 8
 """Frequencies in one kernel: it compiles in a second, and reads the facets once for all."""
@@ -51,6 +63,7 @@ class Port:
     position: Float[np.ndarray, " 3"]  # [m]
     aim: Float[np.ndarray, " 3"]  # unit vector
     pattern: Float32[np.ndarray, " steps"] | None  # over sin(ψ/2), ψ off the aim; None: 1
+    polarization: Polarization = VERTICAL
 
     @cached_property
     def at_most(self) -> Float32[np.ndarray, " steps"]:
@@ -109,7 +122,15 @@ class BistaticKernel:
         self._sizes = dr.select(filled, self._sizes, 0.0)
         self._two_sided = mi.Bool(not surface.closed)
         dr.eval(self._centres, self._normals, self._edges, self._sizes)
-        self._frequencies = frequencies
+        self._frequencies, self._material = frequencies, material
+        start, stop = float(frequencies.min()), float(frequencies.max())
+        self._permittivity = middle_permittivity(material, start, stop)
+        self._share: float | None = None
+        self._mean: Any = None
+        if is_rough(surface):
+            wavelength = 2 * speed_of_light / (start + stop)
+            self._share = slope_share(surface.roughness, SMOOTHED * wavelength)
+            self._mean = self._mean_normals(surface)
         self._tables = (
             None
             if isinstance(material, Conductor)
@@ -148,18 +169,26 @@ class BistaticKernel:
     ) -> Complex[np.ndarray, " some"]:
         one, other = self._leg(transmit), self._leg(receive)
         length = one.distance + other.distance
-        lit = (one.cosine * other.cosine > 0) & (self._two_sided | (one.cosine > 0))
+        facing = one.cosine, other.cosine
+        if self._mean is not None:
+            facing = dr.dot(one.direction, self._mean), dr.dot(other.direction, self._mean)
+        lit = (facing[0] * facing[1] > 0) & (self._two_sided | (facing[0] > 0))
         if seen is not None:
             lit &= seen
         product = mi.Float(one.distance) * mi.Float(other.distance)
-        amplitude = abs(one.cosine + other.cosine) * self._sizes / (8 * math.pi * product)
+        amplitude = self._sizes / (8 * math.pi * product)
         for end in (one, other):
             if end.gain is not None:
                 amplitude *= end.gain
         amplitude = dr.select(lit, amplitude, 0.0)
         both = one.direction + other.direction
         first, second = (dr.dot(both, edge) for edge in self._edges)
-        te, tm = vertical_shares(one.exact, other.exact)
+        legs = Legs(one.exact, other.exact, one.field, other.field)
+        shares = mirror_shares(legs)
+        te, tm = mi.Float(shares.te), mi.Float(shares.tm)
+        side = dr.select(facing[0] > 0, mi.Float(1.0), mi.Float(-1.0))
+        oblique = side * (one.cosine + other.cosine)
+        extra = None if self._mean is None else self._curvature(legs, side)
         half_angle = dr.minimum(mi.Float(0.5 * dr.norm(mi.Vector3d(both))), 1.0)
         terms = []
         for row in rows:
@@ -170,12 +199,15 @@ class BistaticKernel:
             re, im = triangle_transform(wave * first, wave * second)
             re, im = re * cosine - im * sine, re * sine + im * cosine
             if self._tables is None:
-                turned = amplitude * (tm - te)
-                terms += [turned * re, turned * im]
+                turned = oblique * (tm - te) if extra is None else oblique * (tm - te) + extra
+                terms += [amplitude * turned * re, amplitude * turned * im]
             else:
                 mirror = _interpolated(self._tables[row], half_angle)
-                g_re = amplitude * (te * mirror[0] + tm * mirror[2])
-                g_im = amplitude * (te * mirror[1] + tm * mirror[3])
+                g_re = oblique * (te * mirror[0] + tm * mirror[2])
+                g_im = oblique * (te * mirror[1] + tm * mirror[3])
+                if extra is not None:
+                    g_re, g_im = g_re + extra.real, g_im + extra.imag
+                g_re, g_im = amplitude * g_re, amplitude * g_im
                 terms += [g_re * re - g_im * im, g_re * im + g_im * re]
         dr.eval(*terms)  # together: one kernel
         parts = [
@@ -197,7 +229,34 @@ class BistaticKernel:
             aim = mi.Vector3d(*(dr.opaque(mi.Float64, float(value)) for value in port.aim))
             place = mi.Float(dr.norm(-exact - aim)) * (0.5 * (len(port.pattern) - 1))
             gain = _lookup(mi.Float(port.pattern), place, len(port.pattern))
-        return _Leg(distance, exact, direction, dr.dot(direction, self._normals), gain)
+        axis = mi.Vector3d(*(dr.opaque(mi.Float64, float(a)) for a in port.polarization.axis))
+        vector = field_vector(exact, axis, port.polarization.cross_polar)
+        return _Leg(distance, exact, direction, dr.dot(direction, self._normals), gain, vector)
+
+    def _mean_normals(self, surface: Surface) -> Any:
+        corners = [
+            mi.Vector3d(
+                *(dr.gather(mi.Float64, axis, index) for axis in _axes(surface.mean_vertices))
+            )
+            for index in (mi.UInt32(_padded(c, self._short)) for c in surface.cells.T)
+        ]
+        across = dr.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normals = mi.Vector3f(across / dr.norm(across))
+        dr.eval(normals)
+        return normals
+
+    def _curvature(self, legs: Legs, side: Any) -> Any:
+        """Work out what roughness adds to the facets' weights; complex for a dielectric. [-]."""
+        mean, normals = side * mi.Vector3d(self._mean), side * mi.Vector3d(self._normals)
+        upright = dr.dot(mean, normals)
+        slope = mean - normals / dr.maximum(upright, 1e-6)
+        permittivity = Complex2d(self._permittivity.real, self._permittivity.imag)
+        kernel = scattering_kernel(self._material, legs, permittivity)
+        share = 0.0 if self._share is None else self._share
+        added = upright * curvature_weight(kernel, legs, mean, slope, share)
+        if isinstance(self._material, Conductor):
+            return mi.Float(added)
+        return Complex2f(mi.Float(added.real), mi.Float(added.imag))
 
 
 @dataclass(frozen=True)
@@ -207,6 +266,7 @@ class _Leg:
     direction: Any
     cosine: Any
     gain: Any
+    field: Any
 
 
 def reflection_rows(
@@ -236,27 +296,6 @@ def reflection_rows(
     both = reflection(material, frequencies, np.linspace(0.0, 1.0, angles + 1))
     parts = [both.te.real, both.te.imag, both.tm.real, both.tm.imag]
     return np.ascontiguousarray(np.stack(parts, axis=-1).swapaxes(0, 1), dtype=np.float32)
-
-
-def vertical_shares(transmit: Any, receive: Any) -> tuple[Any, Any]:
-    """Split a vertical link into TE and TM. [-].
-
-    See :mod:`simulator.materials.reflection_coefficients`.
-    """
-    along = dr.dot(transmit, receive)
-    turn = 1.0 - along * along
-    across = receive.x * transmit.y - receive.y * transmit.x
-    upright = dr.sqrt(
-        dr.maximum(1.0 - transmit.z * transmit.z, 0.0)
-        * dr.maximum(1.0 - receive.z * receive.z, 0.0)
-    )
-    scale = dr.select(turn * upright > 0.0, 1.0 / (turn * upright), 0.0)
-    one_way = turn <= 1e-10
-    te = dr.select(
-        one_way, dr.select(upright > 0.0, mi.Float64(1.0), mi.Float64(0.0)), across**2 * scale
-    )
-    tm = (receive.z - transmit.z * along) * (transmit.z - receive.z * along) * scale
-    return mi.Float(te), mi.Float(dr.select(one_way, 0.0, tm))
 
 
 def _interpolated(table: Any, cosine: Any) -> Any:

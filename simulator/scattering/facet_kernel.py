@@ -19,15 +19,28 @@ from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.compute import engine
+from simulator.antennas.polarization import VERTICAL, Polarization, field_vector
 from simulator.geometry.facets import Facets
+from simulator.materials.layered_media import Conductor, Material
+from simulator.materials.reflection_coefficients import Legs, conductor_mirror
 from simulator.numerics.nufft_sum import FrequencySum
 from simulator.scattering.triangle_transform import triangle_transform
+from simulator.scattering.weighted_curvature import (
+    curvature_weight,
+    half_space_mirror,
+    scattering_kernel,
+)
 
 mi.set_variant(engine.mitsuba_variant())
+
+Complex2f: Any = mi.Complex2f
+Complex2d: Any = mi.Complex2d
 
 
 WAITING = 2
 """Links whose facets are ready before a core is free to sum them: each takes 40 byte a facet."""
+
+CONDUCTOR = Conductor()
 
 Pair = tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]
 """Where a link's transmitter and receiver stand. [m]"""
@@ -39,13 +52,20 @@ class Weights:
 
     lit: Bool[np.ndarray, " facets"]  # seen from both ends
     gain: Float[np.ndarray, " facets"] | None = None  # product of both patterns; None: 1
+    material: Material = CONDUCTOR
+    permittivity: complex = 1.0 + 0j  # of the material
+    share: float | None = None  # see simulator.geometry.facets.Relief; None: smooth
 
 
 class FacetKernel:
-    """Facets as the kernel reads them."""
+    """Facets as the kernel reads them, between antennas of two polarizations."""
 
-    def __init__(self, facets: Facets) -> None:
+    def __init__(
+        self, facets: Facets, sent: Polarization = VERTICAL, received: Polarization = VERTICAL
+    ) -> None:
         self.count = facets.count
+        self.polarizations = sent, received
+        self.mean = self.normals_of(facets)
         self.centres = [mi.Float64(np.ascontiguousarray(axis)) for axis in facets.centres.T]
         self.normals = _single(facets.normals)
         self.sizes = mi.Float(facets.sizes.astype(np.float32))
@@ -88,29 +108,68 @@ class FacetKernel:
         sine, cosine = dr.sincos(mi.Float(turns - dr.round(turns)) * (-2 * math.pi))
         # In double: it is multiplied by hundreds of steps.
         phases = (steps - dr.round(steps)) * (2 * math.pi)
-        same_side = inward.cosine * outward.cosine > 0
-        lit = mi.Bool(weights.lit) & same_side & (self.two_sided | (inward.cosine > 0))
+        facing = inward.cosine, outward.cosine
+        if self.mean is not None:
+            facing = tuple(dr.dot(leg.direction, self.mean) for leg in (inward, outward))
+        lit = mi.Bool(weights.lit) & (facing[0] * facing[1] > 0)
+        lit &= self.two_sided | (facing[0] > 0)
         product = mi.Float(inward.distance) * mi.Float(outward.distance)
-        amplitude = abs(inward.cosine + outward.cosine) * self.sizes / (8 * math.pi * product)
-        if monostatic:
-            amplitude = -amplitude
-        else:
-            amplitude *= _turned(inward.exact, outward.exact)
+        amplitude = self.sizes / (8 * math.pi * product)
         if weights.gain is not None:
             amplitude *= mi.Float(weights.gain.astype(np.float32))
         amplitude = dr.select(lit, amplitude, 0.0)
+        legs = self._legs(inward, outward, monostatic=monostatic)
+        mirror = mi.Float(-1.0) if monostatic else mi.Float(conductor_mirror(legs))
+        weight: Any = abs(inward.cosine + outward.cosine) * mirror
+        if weights.share is not None and self.mean is not None:
+            side = dr.select(facing[0] > 0, mi.Float(1.0), mi.Float(-1.0))
+            weight = side * (inward.cosine + outward.cosine) * mirror
+            weight = weight + self._curvature(legs, side, weights, monostatic=monostatic)
         both = inward.direction + outward.direction
         first, second = (dr.dot(both, edge) / speed_of_light for edge in self.edges)
         terms = []
         for node in total.nodes:
             wave = dr.opaque(mi.Float, 2 * math.pi * float(node))
             re, im = triangle_transform(wave * first, wave * second)
-            terms += [
-                amplitude * (re * cosine - im * sine),
-                amplitude * (re * sine + im * cosine),
-            ]
+            re, im = amplitude * (re * cosine - im * sine), amplitude * (re * sine + im * cosine)
+            if isinstance(weight, Complex2f):
+                real, imaginary = weight.real, weight.imag
+                re, im = re * real - im * imaginary, re * imaginary + im * real
+            else:
+                re, im = re * weight, im * weight
+            terms += [re, im]
         dr.eval(phases, *terms)  # together: one kernel
         return phases.numpy(), [term.numpy() for term in terms]
+
+    @staticmethod
+    def normals_of(facets: Facets) -> Any:
+        """Return normals of the mean surface; None if nothing is rough."""
+        return None if facets.relief is None else _single(facets.relief.normals)
+
+    def _legs(self, inward: "_Leg", outward: "_Leg", *, monostatic: bool) -> Legs:
+        axes = [
+            (mi.Vector3d(*(dr.opaque(mi.Float64, float(a)) for a in one.axis)), one.cross_polar)
+            for one in self.polarizations
+        ]
+        sent = field_vector(inward.exact, *axes[0])
+        received = sent if monostatic else field_vector(outward.exact, *axes[1])
+        return Legs(inward.exact, outward.exact, sent, received)
+
+    def _curvature(self, legs: Legs, side: Any, weights: Weights, *, monostatic: bool) -> Any:
+        """Work out what roughness adds to the weights, over what is common to all. [-]."""
+        mean, normals = side * mi.Vector3d(self.mean), side * mi.Vector3d(self.normals)
+        upright = dr.dot(mean, normals)
+        slope = mean - normals / dr.maximum(upright, 1e-6)
+        permittivity = Complex2d(weights.permittivity.real, weights.permittivity.imag)
+        kernel = scattering_kernel(weights.material, legs, permittivity)
+        share = 0.0 if weights.share is None else weights.share
+        added = upright * curvature_weight(kernel, legs, mean, slope, share)
+        if isinstance(weights.material, Conductor):
+            return mi.Float(added)
+        mirror = 1.0 / half_space_mirror(weights.permittivity) if monostatic else 1.0 + 0j
+        # The kernel turns the field round.
+        added = added * Complex2d(-mirror.real, -mirror.imag)
+        return Complex2f(mi.Float(added.real), mi.Float(added.imag))
 
     def _leg(self, end: Float[np.ndarray, " 3"]) -> "_Leg":
         # Opaque: the same kernel serves all links.
@@ -193,23 +252,3 @@ def _sum(
 
 def _single(vectors: Float[np.ndarray, "facets 3"]) -> Any:
     return mi.Vector3f(*(mi.Float(axis.astype(np.float32)) for axis in vectors.T))
-
-
-def _turned(transmit: Any, receive: Any) -> Any:
-    """Reflect between vertical antennas. [-].
-
-    See :mod:`simulator.materials.reflection_coefficients`.
-    """
-    along = dr.dot(transmit, receive)
-    turn = 1.0 - along * along
-    across = receive.x * transmit.y - receive.y * transmit.x
-    upright = dr.sqrt(
-        dr.maximum(1.0 - transmit.z * transmit.z, 0.0)
-        * dr.maximum(1.0 - receive.z * receive.z, 0.0)
-    )
-    te = across * across
-    tm = (receive.z - transmit.z * along) * (transmit.z - receive.z * along)
-    scale = turn * upright
-    split = dr.select(scale > 0.0, (tm - te) / scale, 0.0)
-    one_way = dr.select(upright > 0.0, mi.Float64(-1.0), mi.Float64(0.0))
-    return mi.Float(dr.select(turn <= 1e-10, one_way, split))

@@ -25,12 +25,22 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.links import Links
+from simulator.antennas.polarization import field_vector
 from simulator.geometry.patches import Patches
 from simulator.materials.layered_media import Conductor, Material, reflection
+from simulator.materials.reflection_coefficients import Legs, conductor_mirror, mirror_shares
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
 from simulator.scattering.triangle_transform import triangle_transform
+from simulator.scattering.weighted_curvature import (
+    curvature_weight,
+    half_space_mirror,
+    middle_permittivity,
+    scattering_kernel,
+)
 
 mi.set_variant(engine.mitsuba_variant())
+
+Complex2f: Any = mi.Complex2f
 
 
 SHAPE_NODES = 3
@@ -39,21 +49,27 @@ SHAPE_NODES = 3
 ANGLES = 2048
 """Cosines of incidence at which a dielectric's coefficients are tabulated. [-]"""
 
-ONE_WAY = 1e-9
-"""Squared sine between the legs below which they are one, in single precision. [-]"""
-
 
 class PatchKernel:
     """Patches as the kernel reads them."""
 
     def __init__(
-        self, patches: Patches, material: Material, nodes: Float[np.ndarray, " nodes"]
+        self,
+        patches: Patches,
+        material: Material,
+        nodes: Float[np.ndarray, " nodes"],
+        *,
+        share: float | None = None,
     ) -> None:
         self.patches, self.material, self.nodes = patches, material, nodes
+        self.share = share if patches.mean is not None else None  # None: they are smooth
         self.first = mi.UInt32(patches.first.astype(np.uint32))
-        self.values = mi.Float(
-            np.concatenate([patches.offsets, patches.edges.reshape(-1, 6)], axis=-1).ravel()
-        )
+        values = [patches.offsets, patches.edges.reshape(-1, 6)]
+        if self.share is not None and patches.mean is not None:
+            values.append(patches.mean)
+        self.values = mi.Float(np.concatenate(values, axis=-1).ravel())
+        self.stride = 3 * (1 + len(values))
+        self.permittivity = middle_permittivity(material, float(nodes.min()), float(nodes.max()))
         self.one_sided = mi.Bool(patches.one_sided)
         self.all_two_sided = not patches.one_sided.any()
         self.centres = [mi.Float64(np.ascontiguousarray(axis)) for axis in patches.centres.T]
@@ -92,7 +108,7 @@ class PatchKernel:
         size = self.nodes.size
 
         def body(index: Any, *sums: Any) -> tuple[Any, ...]:
-            at = index * 9
+            at = index * self.stride
             offset, one, other = (
                 mi.Vector3f(*(dr.gather(mi.Float, self.values, at + k + axis) for axis in range(3)))
                 for k in (0, 3, 6)
@@ -100,28 +116,40 @@ class PatchKernel:
             across = 0.5 * dr.cross(one, other)
             first = inward.leg(offset)
             second = first if links.echo else outward.leg(offset)
-            here, there = dr.dot(first.direction, across), dr.dot(second.direction, across)
+            mean: Any = across  # the side of it that faces both ends is lit
+            if self.share is not None:
+                mean = mi.Vector3f(
+                    *(dr.gather(mi.Float, self.values, at + 9 + axis) for axis in range(3))
+                )
+            here, there = dr.dot(first.direction, mean), dr.dot(second.direction, mean)
             lit = here * there > 0
             if not self.all_two_sided:
                 lit &= (here > 0) | ~dr.gather(mi.Bool, self.one_sided, index)
             if seen is not None:
                 lit &= dr.gather(mi.Bool, seen, index * count + link)
-            amplitude = abs(here + there) / (8 * math.pi * first.distance * second.distance)
+            amplitude = 1.0 / (8 * math.pi * first.distance * second.distance)
             amplitude *= inward.gain(first.direction)
             amplitude *= outward.gain(second.direction)
             both = first.direction + second.direction
             amplitude = dr.select(lit, amplitude, 0.0)
             shapes = self._shapes(dr.dot(both, one), dr.dot(both, other))
             phasors = self._phasors(first.longer + second.longer)
-            coefficients = reflector(first.direction, second.direction)
+            legs = self._legs(inward, outward, first.direction, second.direction)
+            coefficients = reflector(legs)
+            oblique, extra = dr.abs(here + there), None
+            if self.share is not None:
+                side = dr.select(here > 0, mi.Float(1.0), mi.Float(-1.0))
+                oblique = side * dr.dot(both, across)
+                extra = self._curvature(legs, side, (mean, across), echo=links.echo)
             new = []
             for node in range(size):
                 re, im = _product(shapes[node], phasors[node])
                 gamma = coefficients if isinstance(coefficients, _Real) else coefficients[node]
-                if isinstance(gamma, _Real):
-                    re, im = re * gamma.value, im * gamma.value
+                weight = _weighed(gamma, oblique, extra)
+                if isinstance(weight, _Real):
+                    re, im = re * weight.value, im * weight.value
                 else:
-                    re, im = _product((re, im), gamma)
+                    re, im = _product((re, im), weight)
                 new += [sums[2 * node] + amplitude * re, sums[2 * node + 1] + amplitude * im]
             return index + 1, *new
 
@@ -180,20 +208,15 @@ class PatchKernel:
         """Return what gives the coefficients of a triangle from both directions."""
         if echo:
             constant = _Real(mi.Float(-1.0 if isinstance(self.material, Conductor) else 1.0))
-            return lambda first, second: constant
+            return lambda legs: constant
         if isinstance(self.material, Conductor):
-
-            def conductor(first: Any, second: Any) -> _Real:
-                te, tm = _shares(first, second)
-                return _Real(tm - te)
-
-            return conductor
+            return lambda legs: _Real(conductor_mirror(legs))
         middle = mi.Float(_half_angle_cosine(inward.towards_centre(), outward.towards_centre()))
         te_and_tm = self._tabulated(middle)
 
-        def dielectric(first: Any, second: Any) -> list[Any]:
-            shares = _shares(first, second)
-            apart = _half_angle_cosine(first, second) - middle
+        def dielectric(legs: Legs) -> list[Any]:
+            shares = mirror_shares(legs)
+            apart = _half_angle_cosine(legs.transmit, legs.receive) - middle
             gammas = []
             for node in range(self.nodes.size):
                 parts = [0.0, 0.0]
@@ -205,6 +228,35 @@ class PatchKernel:
             return gammas
 
         return dielectric
+
+    def _legs(self, inward: "_End", outward: "_End", first: Any, second: Any) -> Legs:
+        """Both directions with the antennas' fields; those are asked for where they count."""
+        mirrored = outward is inward
+        if mirrored and self.share is None:
+            return Legs(first, second, first, second)
+        sent = inward.field(first)
+        received = sent if mirrored else outward.field(second)
+        return Legs(first, second, sent, received)
+
+    def _curvature(self, legs: Legs, side: Any, normals: tuple[Any, Any], *, echo: bool) -> Any:
+        """Work out what roughness adds to a triangle's weight; complex for a dielectric. [m²]."""
+        mean, across = (side * normal for normal in normals)
+        area = dr.dot(mean, across)
+        slope = mean - across / dr.maximum(area, 1e-30)
+        permittivity = Complex2f(
+            dr.opaque(mi.Float, self.permittivity.real), dr.opaque(mi.Float, self.permittivity.imag)
+        )
+        kernel = scattering_kernel(self.material, legs, permittivity)
+        assert self.share is not None
+        weight = area * curvature_weight(kernel, legs, mean, slope, self.share)
+        if isinstance(self.material, Conductor):
+            return weight
+        if echo:  # its coefficient at normal incidence is left out
+            mirror = 1.0 / half_space_mirror(self.permittivity)
+            weight = weight * Complex2f(
+                dr.opaque(mi.Float, mirror.real), dr.opaque(mi.Float, mirror.imag)
+            )
+        return weight
 
     def _tabulated(self, cosine: Any) -> list[list[tuple[Any, Any]]]:
         """Look up the coefficients at a cosine, and their slopes, by cubic interpolation."""
@@ -265,6 +317,7 @@ class _End:
         self.distance: Any
         self.apart, self.distance = mi.Vector3f(*(mi.Float(a) for a in apart)), mi.Float(distance)
         self.pattern = pattern
+        self.axis = mi.Vector3f(*(dr.opaque(mi.Float, float(a)) for a in pattern.polarization.axis))
         self.aim = mi.Vector3f(*(dr.opaque(mi.Float, float(a)) for a in pattern.aim))
         self.peak = dr.opaque(mi.Float, pattern.peak)
 
@@ -278,6 +331,10 @@ class _End:
             distance + self.distance
         )
         return _Leg(towards / distance, distance, longer)
+
+    def field(self, direction: Any) -> Any:
+        """Vector of the antenna's field at a triangle that sees it in that direction."""
+        return field_vector(direction, self.axis, self.pattern.polarization.cross_polar)
 
     def gain(self, direction: Any) -> Any:
         """Field pattern towards a triangle that sees the antenna in that direction."""
@@ -304,24 +361,17 @@ def _product(one: Any, other: Any) -> tuple[Any, Any]:
     return one[0] * other[0] - one[1] * other[1], one[0] * other[1] + one[1] * other[0]
 
 
+def _weighed(gamma: Any, oblique: Any, extra: Any) -> Any:
+    """Weight of a triangle: its mirror's, and what roughness adds."""
+    if isinstance(gamma, _Real):
+        if extra is None:
+            return _Real(gamma.value * oblique)
+        if isinstance(extra, Complex2f):
+            return (gamma.value * oblique + extra.real, extra.imag)
+        return _Real(gamma.value * oblique + extra)
+    re, im = gamma[0] * oblique, gamma[1] * oblique
+    return (re, im) if extra is None else (re + extra.real, im + extra.imag)
+
+
 def _half_angle_cosine(first: Any, second: Any) -> Any:
     return dr.minimum(0.5 * dr.norm(first + second), 1.0)
-
-
-def _shares(first: Any, second: Any) -> tuple[Any, Any]:
-    """TE and TM share of a link of vertical antennas.
-
-    See :mod:`simulator.materials.reflection_coefficients`.
-    """
-    across = dr.cross(first, second)
-    turn = dr.squared_norm(across)
-    upright = dr.sqrt(
-        dr.maximum(1.0 - first.z * first.z, 0.0) * dr.maximum(1.0 - second.z * second.z, 0.0)
-    )
-    one_way = turn < ONE_WAY
-    unit = across / dr.sqrt(dr.maximum(turn, ONE_WAY))
-    scale = dr.select(upright > 0.0, 1.0 / dr.maximum(upright, 1e-12), 0.0)
-    te = unit.z * unit.z * scale
-    tm = -dr.cross(first, unit).z * dr.cross(second, unit).z * scale
-    straight = dr.select(upright > 0.0, mi.Float(1.0), mi.Float(0.0))
-    return dr.select(one_way, straight, te), dr.select(one_way, 0.0, tm)

@@ -91,12 +91,12 @@ def scattered_by_patches(
     side = patch_side(facets, stop - start)
     chosen = np.ones(facets.count, dtype=bool) if chosen is None else chosen
     done, told, whole = 0, 0, int(np.count_nonzero(chosen))
-    for material, mask in facets.by_material:
+    for material, share, mask in facets.by_material:
         some = np.flatnonzero(chosen if mask is None else chosen & mask)
         if isinstance(material, Absorber) or some.size == 0:
             continue
         patches = cut_into_patches(facets, some, side)
-        work = _Work(patches, material, links, frequencies, factor, factor_nodes)
+        work = _Work(patches, (material, share), links, frequencies, factor, factor_nodes)
         part = np.zeros_like(spectrum)
         for block in _blocks(patches, min(FACETS_AT_ONCE, max(1, TABLE_AT_ONCE // count))):
             part += work.block(block, look)
@@ -128,12 +128,13 @@ class _Work:
     def __init__(
         self,
         patches: Patches,
-        material: Material,
+        kind: tuple[Material, float | None],
         links: Links,
         frequencies: Float[np.ndarray, " freqs"],
         factor: Factor | None,
         factor_nodes: int,
     ) -> None:
+        material, self.share = kind
         start, stop = float(frequencies[0]), float(frequencies[-1])
         delays = 4 * float(patches.radii.max()) / speed_of_light  # there and back, about the centre
         nodes = nodes_needed(delays, stop - start, accuracy=ACCURACY)
@@ -195,7 +196,7 @@ class _Work:
         *,
         mask: Bool[np.ndarray, "facets links"] | None = None,
     ) -> None:
-        kernel = PatchKernel(patches, self.material, self.few)
+        kernel = PatchKernel(patches, self.material, self.few, share=self.share)
         links, basis = self.links, None
         if aperture is not None and counts is not None:
             links, basis = aperture.nodes(counts, links)

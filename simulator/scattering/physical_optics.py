@@ -26,9 +26,10 @@ from scipy.constants import speed_of_light
 from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports, isotropic
-from simulator.geometry.facets import Facets
-from simulator.materials.layered_media import Absorber, Conductor, Material
+from simulator.geometry.facets import Facets, Group
+from simulator.materials.layered_media import Absorber, Conductor
 from simulator.materials.reflection_coefficients import (
+    Legs,
     angle_class,
     echo_coefficient,
     facet_coefficients,
@@ -37,6 +38,7 @@ from simulator.materials.reflection_coefficients import (
 )
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
 from simulator.scattering.edge_diffraction import edge_echo, edge_view
+from simulator.scattering.rough_triangles import rough_weights
 from simulator.scattering.small_slope import (
     MOST_ALONG,
     GridOfWeights,
@@ -44,6 +46,7 @@ from simulator.scattering.small_slope import (
     reflection_of_front,
 )
 from simulator.scattering.triangle_transform import triangle_transform
+from simulator.scattering.weighted_curvature import half_space_mirror, middle_permittivity
 
 SAMPLES_AT_ONCE = 4_000_000
 """Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
@@ -99,9 +102,9 @@ def scattered(
     count = nodes_needed(2 * facets.extent / speed_of_light, stop - start)
     count += transmit.nodes + receive.nodes - 2  # degrees of a product add up
     parts = [
-        _Part(facets, material, mask, count, frequencies, monostatic=monostatic)
-        for material, mask in facets.by_material
-        if not isinstance(material, Absorber)
+        _Part(facets, group, count, frequencies, monostatic=monostatic)
+        for group in facets.by_material
+        if not isinstance(group.material, Absorber)
     ]
     if _suits_the_kernel(facets, transmit, receive, parts):
         return _by_kernel(facets, transmit, receive, parts, frequencies, advance)
@@ -111,7 +114,7 @@ def scattered(
         inward = shared or _Leg(facets, transmit, index)
         outward = inward if monostatic else _Leg(facets, receive, index)
         # Both ends must see the same side of the facet.
-        lit = inward.lit & outward.lit & (inward.cosine * outward.cosine > 0)
+        lit = inward.lit & outward.lit & (inward.facing * outward.facing > 0)
         spectrum = np.zeros(frequencies.size, dtype=np.complex128)
         for part in parts:
             chosen = lit if part.mask is None else lit & part.mask
@@ -155,7 +158,7 @@ def _by_kernel(
         (transmit.positions[sender], receive.positions[index])
         for index, sender in enumerate(senders)
     ]
-    kernel = FacetKernel(facets)
+    kernel = FacetKernel(facets, transmit.polarization, receive.polarization)
     some = np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(int))
     spread = MARGIN * kernel.typical_advance([pairs[index] for index in some])
     start, stop = float(frequencies[0]), float(frequencies[-1])
@@ -180,7 +183,13 @@ def _by_kernel(
             one = gain(transmit, sender)
             other = one if monostatic else gain(receive, index)
             both = other if one is None else one if other is None else one * other
-            return Weights(lit=lit, gain=both)
+            return Weights(
+                lit=lit,
+                gain=both,
+                material=part.material,
+                permittivity=part.permittivity,
+                share=part.share,
+            )
 
         def told(part: _Part = part) -> None:
             if part is parts[-1]:
@@ -198,25 +207,32 @@ class _Part:
     def __init__(
         self,
         facets: Facets,
-        material: Material,
-        mask: Bool[np.ndarray, " facets"] | None,
+        group: Group,
         count: int,
         frequencies: Float[np.ndarray, " freqs"],
         *,
         monostatic: bool,
     ) -> None:
-        self.material, self.mask, self.count = material, mask, count
+        self.material, self.share, self.mask = group
+        self.count = count
         self.frequencies, self.monostatic = frequencies, monostatic
         self.polarization = facets.polarization
+        self.permittivity = middle_permittivity(
+            self.material, float(frequencies[0]), float(frequencies[-1])
+        )
         self.runs = [
-            run for run in facets.runs if run.rough and (mask is None or mask[run.facets[0]])
+            run
+            for run in facets.runs
+            if run.rough and (self.mask is None or self.mask[run.facets[0]])
         ]
         if self.runs:
             self.count = max(count, ROUGH_NODES)
         # Towards where it came from, facets reflect alike: the sum is multiplied once.
         self.common: Complex[np.ndarray, " freqs"] | None = None
-        if monostatic and not isinstance(material, Conductor):
-            self.common = echo_coefficient(material, frequencies, polarization=self.polarization)
+        if monostatic and not isinstance(self.material, Conductor):
+            self.common = echo_coefficient(
+                self.material, frequencies, polarization=self.polarization
+            )
         self._totals: dict[float, FrequencySum] = {}
         self._grids: dict[tuple[int, int, float, float], GridOfWeights] = {}
         self._lock = threading.Lock()
@@ -249,7 +265,9 @@ class _Part:
         nodes: Float[np.ndarray, " nodes"],
         facets: Facets,
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Obliquity times reflection of smooth facets, and what stands for it on rough lines."""
+        """Obliquity times reflection of smooth facets, and what stands for it on rough ones."""
+        if self.share is not None:
+            return self._rough_triangles(inward, outward, some, nodes, facets)
         smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
         obliquity = np.abs(inward.cosine[some[smooth]] + outward.cosine[some[smooth]])
         flat = obliquity * self._coefficients(
@@ -271,6 +289,29 @@ class _Part:
             half = reflection_of_front(self.material, nodes, polarization=self.polarization)
             weights[:, facets.rough[some]] /= half[:, None]
         return weights
+
+    def _rough_triangles(
+        self,
+        inward: "_Leg",
+        outward: "_Leg",
+        some: np.ndarray,
+        nodes: Float[np.ndarray, " nodes"],
+        facets: Facets,
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        share, part, side = (
+            float(self.share or 0.0),
+            facets.part(some),
+            np.sign(inward.facing[some]),
+        )
+        one = inward.direction[some].T, inward.fields(some).T
+        other = one if outward is inward else (outward.direction[some].T, outward.fields(some).T)
+        legs = Legs(transmit=one[0], receive=other[0], sent=one[1], received=other[1])
+        added = rough_weights(part, side, legs, self.material, self.permittivity, share)
+        if self.common is not None:
+            added = added / half_space_mirror(self.permittivity)
+        cosines = side * (inward.cosine[some] + outward.cosine[some])
+        mirrored = self._coefficients(inward, outward, some, nodes, flat=False)
+        return np.asarray(mirrored * cosines + added)
 
     def _grid(
         self,
@@ -318,8 +359,9 @@ class _Part:
         if self.monostatic and isinstance(self.material, Conductor):
             return np.full((1, len(some)), -1.0 if self.polarization == "vertical" else 1.0)
         legs = inward.direction[some], outward.direction[some]
+        fields = None if flat else (inward.fields(some), outward.fields(some))
         return facet_coefficients(
-            self.material, *legs, nodes, flat=flat, polarization=self.polarization
+            self.material, *legs, nodes, fields=fields, polarization=self.polarization
         )
 
 
@@ -331,8 +373,12 @@ class _Leg:
         self.distance = np.sqrt(np.einsum("fx,fx->f", towards, towards))
         self.direction = towards / self.distance[:, None]
         self.cosine = np.einsum("fx,fx->f", self.direction, facets.normals)
-        self.lit = ports.visible[index] & (facets.two_sided | (self.cosine > 0))
-        self.pattern = ports.pattern
+        # A surface does not hide itself by its own roughness: the mean surface has to face it.
+        self.facing = self.cosine
+        if facets.relief is not None:
+            self.facing = np.einsum("fx,fx->f", self.direction, facets.relief.normals)
+        self.lit = ports.visible[index] & (facets.two_sided | (self.facing > 0))
+        self.pattern, self.polarization = ports.pattern, ports.polarization
         self._gains: dict[int, np.ndarray] = {}
 
     def along(
@@ -341,6 +387,10 @@ class _Leg:
         """Component of the direction along a line's mean course. [-]."""
         direction, normal = self.direction[some], facets.normals[some]
         return np.asarray(direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1])
+
+    def fields(self, some: np.ndarray) -> Float[np.ndarray, "some 3"]:
+        """Vectors of the antenna's field at some of the facets."""
+        return self.polarization.field(-self.direction[some])
 
     def gain(
         self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]

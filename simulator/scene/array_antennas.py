@@ -12,6 +12,7 @@ from scenes.schema.antenna import Antenna
 from scenes.surfaces.tiled_faces import Reach
 from simulator.antennas.antenna_pattern import ISOTROPIC, AntennaPattern
 from simulator.antennas.beam_culling import AntennaGroup, in_reach
+from simulator.antennas.polarization import antenna_polarization
 from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg
 from simulator.specular.image_sources import DIRECT, Leg
 
@@ -101,4 +102,5 @@ def _group(
     scenario: Scenario, antenna: Antenna, positions: Float[np.ndarray, "n 3"]
 ) -> AntennaGroup:
     aim = scenario.aim(antenna, positions.mean(axis=0))
-    return AntennaGroup(positions=positions, pattern=AntennaPattern(antenna, aim))
+    pattern = AntennaPattern(antenna, aim, antenna_polarization(antenna, aim))
+    return AntennaGroup(positions=positions, pattern=pattern)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 
 from scenes.random_streams import random_stream
 from scenes.realisations.object_surface import object_surface
@@ -91,15 +92,27 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
             scattering[name] = (surface, material)
     return RadioScene(
         scenario=scenario,
-        # In two dimensions roughness is the weights' business, and hides nothing.
-        rays=build_scene(surfaces, mean=scenario.dimensions == 2),
-        facets=scene_facets(list(scattering.values()), polarization=scenario.radio.polarization)
-        if scattering
-        else None,
+        # Roughness is the weights' business, and hides nothing.
+        rays=build_scene(surfaces, mean=True),
+        facets=(
+            scene_facets(
+                list(scattering.values()),
+                polarization=scenario.radio.polarization,
+                wavelength=middle_wavelength(scenario),
+            )
+            if scattering
+            else None
+        ),
         elements=elements,
         scattering=tuple(scattering),
         mirrors=mirrors,
     )
+
+
+def middle_wavelength(scenario: Scenario) -> float:
+    """Wavelength in the middle of the band [m]."""
+    frequencies = scenario.radio.frequencies
+    return float(2.0 * speed_of_light / (frequencies[0] + frequencies[-1]))
 
 
 def _mirrors(

@@ -45,7 +45,9 @@ class Leg:
         if not self.sequence:
             return sight
         pattern = AntennaPattern(
-            sight.pattern.antenna, np.einsum("xy,y->x", self.turn, sight.pattern.aim)
+            sight.pattern.antenna,
+            np.einsum("xy,y->x", self.turn, sight.pattern.aim),
+            sight.pattern.polarization.turned(self.turn),
         )
         places = np.einsum("xy,ny->nx", self.turn, sight.positions) + self.shift
         return AntennaGroup(positions=places, pattern=pattern)
@@ -130,7 +132,10 @@ def _reflects(mirrors: Mirrors, mirror: int, image: AntennaGroup) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class LegReflection:
-    """What both legs' mirrors multiply to the sum over a patch, at its centre."""
+    """What both legs' mirrors multiply to the sum over a patch, at its centre.
+
+    Of the field that arrives there, the part along the image's field.
+    """
 
     mirrors: Mirrors
     out: Leg
@@ -144,12 +149,17 @@ class LegReflection:
     ) -> Complex[np.ndarray, "patches links nodes"]:
         """Work it out for links between images."""
         total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
-        for leg, places in ((self.out, links.senders), (self.back, links.receivers)):
+        for leg, places, image in (
+            (self.out, links.senders, links.sent.polarization),
+            (self.back, links.receivers, links.received.polarization),
+        ):
             at_once = max(1, PAIRS_AT_ONCE // len(centres))
             for first in range(0, len(places) if leg.sequence else 0, at_once):
                 some = slice(first, first + at_once)
                 chain = unfolded_chain(self.mirrors, leg.sequence, places[some], centres)
-                field = reflected_field(self.mirrors, chain, nodes)
+                field = reflected_field(
+                    self.mirrors, chain, nodes, sent=image.turned(leg.turn.T), at_place=image
+                )
                 total[:, some] *= np.moveaxis(
                     field.reshape(len(places[some]), len(centres), -1), 0, 1
                 )

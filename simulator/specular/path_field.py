@@ -16,13 +16,11 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Waves
+from simulator.antennas.polarization import VERTICAL, Polarization
 from simulator.geometry.mirrors import Mirrors, dot
 from simulator.materials import layered_media
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import Chain
-
-VERTICAL = np.array([0.0, 0.0, 1.0])
-"""The polarization of all antennas unless told otherwise."""
 
 SAMPLES_AT_ONCE = 1_000_000
 """Paths times frequencies that are evaluated in one go: 16 MB for each complex quantity."""
@@ -45,12 +43,14 @@ def reflected_field(
     chain: Chain,
     frequencies: Float[np.ndarray, " freqs"],
     *,
-    polarization: Float[np.ndarray, " 3"] = VERTICAL,
+    sent: Polarization = VERTICAL,
+    received: Polarization = VERTICAL,
+    at_place: Polarization | None = None,
 ) -> Complex[np.ndarray, "paths freqs"]:
     """Field received over the field sent, spreading and delay apart.
 
-    The product of all reflections, with the coherent loss of roughness, between antennas that
-    send and receive the field's part along one axis.
+    The product of all reflections, with the coherent loss of roughness, between the fields of
+    both antennas.
 
     Parameters
     ----------
@@ -58,11 +58,18 @@ def reflected_field(
         Paths over a sequence of these mirrors.
     frequencies
         Any grid. [Hz]
-    polarization
-        Axis of the antennas; across the ray, the field is along its projection.
+    sent, received
+        Polarizations of the antennas.
+    at_place
+        In place of a receiver: the field of the antenna's image over the chain, of which the
+        part at the path's end is asked for.
     """
     everything = slice(0, len(chain.lengths))
-    return _field(mirrors, chain, everything, frequencies, polarization)
+    if at_place is None:
+        return _field(mirrors, chain, everything, frequencies, (sent, received))
+    # The image's ray goes on as the path ends.
+    image = Polarization(axis=at_place.axis, cross_polar=-at_place.cross_polar)
+    return _field(mirrors, chain, everything, frequencies, (sent, image))
 
 
 def _field(
@@ -70,11 +77,10 @@ def _field(
     chain: Chain,
     some: slice,
     frequencies: Float[np.ndarray, " freqs"],
-    polarization: Float[np.ndarray, " 3"],
+    ends: tuple[Polarization, Polarization],
 ) -> Complex[np.ndarray, "paths freqs"]:
     directions = chain.directions[some]
-    sent = transverse(directions[:, 0], polarization)
-    received = transverse(directions[:, -1], polarization)
+    sent, received = ends[0].field(directions[:, 0]), ends[1].field(-directions[:, -1])
     if not chain.mirrors:
         link = dot(sent, received)[:, None] + 0j
         return np.repeat(link, frequencies.size, axis=1)
@@ -111,7 +117,8 @@ def specular_response(
     *,
     transmit: Gain = isotropic,
     receive: Gain = isotropic,
-    polarization: Float[np.ndarray, " 3"] = VERTICAL,
+    sent: Polarization = VERTICAL,
+    received: Polarization = VERTICAL,
     waves: Waves = "spherical",
 ) -> Complex[np.ndarray, "sources receivers freqs"]:
     """Sum the specular paths of each link.
@@ -126,8 +133,8 @@ def specular_response(
         Numbers of sources and of receivers.
     transmit, receive
         Field patterns of the sources and of the receivers.
-    polarization
-        Axis of all antennas.
+    sent, received
+        Polarizations of the sources and of the receivers.
     waves
         Spherical (S-parameters), or cylindrical (fields of unit line sources).
 
@@ -142,23 +149,10 @@ def specular_response(
         source, receiver = np.nonzero(chain.valid)
         for first in range(0, len(gains), paths_at_once):
             some = slice(first, first + paths_at_once)
-            field = _field(mirrors, chain, some, frequencies, polarization)
+            field = _field(mirrors, chain, some, frequencies, (sent, received))
             field *= gains[some, None] * direct_wave(chain.lengths[some], frequencies, waves=waves)
             response[source[some], receiver[some]] += field  # no link twice: one path a chain
     return response
-
-
-def transverse(
-    directions: Float[np.ndarray, "paths 3"], axis: Float[np.ndarray, " 3"]
-) -> Float[np.ndarray, "paths 3"]:
-    """Return unit vectors along the part of an axis that is across each direction.
-
-    Along the axis itself there is no such part; the field is then taken to be zero.
-    """
-    part = axis - dot(directions, axis)[:, None] * directions
-    length = np.linalg.norm(part, axis=-1, keepdims=True)
-    unit: np.ndarray = np.divide(part, length, out=np.zeros_like(part), where=length > PARALLEL)
-    return unit
 
 
 def _across(

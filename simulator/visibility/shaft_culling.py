@@ -3,8 +3,8 @@
 A shaft is the convex hull of all antennas and of a tile of facets (E. A. Haines and J. R. Wallace,
 "Shaft culling for efficient ray-cast radiosity", 1994, doi:10.1007/978-3-642-57963-9_10). Where a
 plane separates it from every other object, and the object's own facets all face the antennas, a
-ray would find nothing: none is traced. A convex surface with heights over it hides a facet only
-where a facet between faces away.
+ray would find nothing: none is traced. A surface does not hide itself by its own roughness: rays
+meet mean surfaces, and a convex one hides nothing of itself that faces the antennas.
 """
 
 import math
@@ -44,8 +44,8 @@ MOST_FACES = 64
 """Faces of a mesh up to which each is an obstacle of its own; else its bounding box is one. [-]"""
 
 
-Shape = Literal["smooth", "rough plane", "any"]
-"""Smooth and convex: hides none of what faces the antennas; a rough plane: where it is steep."""
+Shape = Literal["convex", "any"]
+"""Convex: hides none of its own that faces the antennas."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +92,7 @@ def scenario_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
 
 def object_shape(scenario: Scenario, name: str) -> Shape:
     """Tell how an object may hide parts of itself."""
-    if isinstance(scenario.objects[name], MeshFile):
-        return "any"
-    if rms_height(scenario, name) == 0:
-        return "smooth"
-    return "rough plane" if isinstance(scenario.objects[name], Plate) else "any"
+    return "any" if isinstance(scenario.objects[name], MeshFile) else "convex"
 
 
 def _triangle(owner: int, corners: Float[np.ndarray, "3 3"], margin: float) -> Obstacle:
@@ -204,37 +200,10 @@ class Sightlines:
         tiles = cut_into_patches(self.facets.part(some), np.arange(len(some)), TILE)
         others = [one for one in self.obstacles if one.owner != self.objects[surface]]
         clear = np.ones(tiles.count, dtype=bool)
-        normals = self.facets.normals[some][tiles.order]
         for ends in self._ends():
             clear &= clear_shafts(ends, tiles.centres, tiles.radii, others)
-            if self.shapes[surface] == "rough plane":
-                clear &= self._all_face(ends, tiles.centres, tiles.radii, tiles.first, normals)
         kept: np.ndarray = tiles.order[np.repeat(clear, np.diff(tiles.first))]
         return kept
-
-    def _all_face(
-        self,
-        ends: Float[np.ndarray, "ends 3"],
-        centres: Float[np.ndarray, "tiles 3"],
-        radii: Float[np.ndarray, " tiles"],
-        first: Int[np.ndarray, " tiles_and_one"],
-        normals: Float[np.ndarray, "facets 3"],
-    ) -> Bool[np.ndarray, " tiles"]:
-        """Tell whose facets, and their neighbours as steep as any, all face the antennas."""
-        counts = np.diff(first)
-        mean = np.add.reduceat(normals, first[:-1], axis=0)
-        mean /= np.linalg.norm(mean, axis=-1, keepdims=True)
-        tilt = np.einsum("fx,fx->f", normals, np.repeat(mean, counts, axis=0))
-        steepest = float(np.arccos(np.clip(tilt.min(), -1.0, 1.0)))
-        middle = ends.mean(axis=0)
-        extent = float(np.linalg.norm(ends - middle, axis=-1).max())
-        towards = middle - centres
-        distance = np.linalg.norm(towards, axis=-1)
-        spread = np.minimum((extent + radii) / distance, 1.0)
-        cosine = np.abs(np.einsum("tx,tx->t", towards, mean)) / distance
-        incidence = np.arccos(np.clip(cosine, 0.0, 1.0)) + np.arcsin(spread)
-        faces: np.ndarray = (spread < 1.0) & (incidence + steepest < np.pi / 2)
-        return faces
 
     def _ends(self) -> list[Float[np.ndarray, "ends 3"]]:
         same = self.senders is self.receivers

@@ -16,8 +16,9 @@ into :math:`|\mathbf q|^2 / q_z`, and the mean power of what is left is
           B = \pi l^2 e^{-s} \sum_{n \ge 1} \frac{s^n}{n!\, n}
           e^{-k^2 q_\parallel^2 l^2 / 4n}
 
-For :math:`s \ll 1` the first term is left, that of small perturbations, :math:`B = (2\pi)^2 k^2
-q_z^2 W(k q_\parallel)` with the spectrum :math:`W` of the heights.
+For :math:`s \ll 1` the first term is left, :math:`B = (2\pi)^2 k^2 q_z^2 W(k q_\parallel)` with the
+spectrum :math:`W` of the heights: the Bragg wave. Its weight is that of small perturbations (Rice
+1951), of which the tangent plane's :math:`\Gamma |\mathbf q|^2 / q_z` is the long-waved limit.
 
 References
 ----------
@@ -36,8 +37,10 @@ from scenes.schema.antenna import Antenna
 from scenes.schema.objects import Plate
 from scenes.schema.roughness import Roughness
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.polarization import VERTICAL
 from simulator.materials.layered_media import Material
-from simulator.materials.reflection_coefficients import facet_coefficients
+from simulator.materials.reflection_coefficients import Legs, facet_coefficients
+from simulator.scattering.weighted_curvature import middle_permittivity, scattering_kernel
 
 TERMS = 30
 """Terms of the series: for s below 5 what is left out is below 1e-12. [-]"""
@@ -110,7 +113,8 @@ def mean_diffuse_power(
     across = both @ plate.normal
     along_squared = np.einsum("fx,fx->f", both, both) - across**2
     tuned = np.array([frequency])
-    mirror = facet_coefficients(material, towards[0], towards[1], tuned, flat=False)[0]
+    fields = VERTICAL.field(-towards[0]), VERTICAL.field(-towards[1])
+    mirror = facet_coefficients(material, towards[0], towards[1], tuned, fields=fields)[0]
     roughened = (wavenumber * across * roughness.rms) ** 2
     length = roughness.correlation_length
     order = np.arange(1, TERMS + 1)[:, None]
@@ -119,8 +123,15 @@ def mean_diffuse_power(
     series *= np.exp(-(along_squared * (wavenumber * length) ** 2) / (4 * order))
     spectrum = math.pi * length**2 * np.exp(-roughened) * series.sum(axis=0)
     area = float(size.prod()) / len(places)
-    slanted = (along_squared + across**2) / across
-    return float(np.sum(np.abs(amplitude * slanted * mirror) ** 2 * spectrum) * area)
+    tangent = 0.5 * (along_squared + across**2) * mirror
+    legs = Legs(towards[0].T, towards[1].T, fields[0].T, fields[1].T)
+    permittivity = middle_permittivity(material, frequency, frequency)
+    facing = plate.normal * np.sign(float(np.median(across)))
+    bragg = tangent + scattering_kernel(material, legs, permittivity)(facing)
+    first = roughened * np.exp(-roughened - along_squared * (wavenumber * length) ** 2 / 4)
+    first = math.pi * length**2 * first
+    power = np.abs(bragg) ** 2 * first + np.abs(tangent) ** 2 * (spectrum - first)
+    return float(np.sum(np.abs(2 * amplitude / across) ** 2 * power) * area)
 
 
 def coherent_loss(

@@ -47,29 +47,11 @@ def test_the_tiles_of_a_plate_have_its_facets() -> None:
     )
 
 
-def test_a_margin_goes_beyond_the_tile_where_the_plate_does() -> None:
-    drawn = sheet()
-    tiles = list(drawn.tiles(17))
-    close, wide = drawn.surface(tiles[0]), drawn.surface(tiles[0], margin=2.5 * drawn.spacings[0])
-    # The first tile is in a corner of the plate: three more cells on two of its sides.
-    assert len(close.cells) == 2 * 17 * 17
-    assert len(wide.cells) == 2 * 20 * 20
-
-
 def test_a_tile_lies_within_its_ball() -> None:
     drawn = sheet()
     for tile in drawn.tiles(17):
         mean = drawn.surface(tile).mean_vertices
         assert np.linalg.norm(mean - tile.centre, axis=-1).max() <= tile.radius * (1 + 1e-9)
-
-
-def test_the_steepest_facet_is_found() -> None:
-    drawn = sheet()
-    whole = object_surface(scenario(), "plate", seed=3, sample=1)
-    corners = whole.vertices[whole.cells]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    cosines = (normals @ drawn.plate.normal) / np.linalg.norm(normals, axis=-1)
-    assert drawn.steepest == pytest.approx(np.tan(np.arccos(cosines.min())), rel=1e-9)
 
 
 def test_only_plates_with_a_height_are_cut_into_tiles() -> None:

@@ -1,5 +1,6 @@
 """The echo between antennas that stand by themselves, on small scenes."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,10 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from estimator.measurement.model import Echo
 from estimator.measurement.store import read_measurement, write_measurement
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario, parse_scenario
+from simulator.geometry.facets import surface_facets
+from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.response import multistatic
 from simulator.scattering.physical_optics import scattered
 from simulator.scene.radio_scene import facet_ports, radio_scene
@@ -136,17 +140,19 @@ def test_where_nothing_is_illuminated_nothing_is_summed(monkeypatch: pytest.Monk
     assert 0 < difference < 1e-3
 
 
-def test_a_shallow_view_is_traced_among_the_tile_and_its_margin(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_in_a_shallow_view_the_sample_does_not_hide_itself_by_its_own_roughness() -> None:
     steep = {**SAMPLE, "roughness": {"rms_mm": 0.1, "correlation_mm": 0.4}}
     grazing = {**APART, "transmitter": {"position_m": [-0.098, 0.085]}}
     scene = scenario(station=grazing, objects={"sample": steep})
-    monkeypatch.setattr(multistatic, "TILE_CELLS", 37)
-    traced = echo(scene).samples
-    assert error(traced, as_a_whole(scene)) <= 1e-2
-    monkeypatch.setattr(multistatic._Part, "own_shadows", lambda self, place: False)
-    assert error(echo(scene).samples, traced) > 0.05  # there are shadows indeed
+    frozen = radio_scene(scene, seed=4, sample=0)
+    assert frozen.facets is not None
+    place = np.array([[-0.098, 0.085, 0.0]])
+    assert facets_visible(frozen.rays, frozen.facets, place).all()
+    # Rays among its own facets would have found shadows.
+    surface = object_surface(scene, "sample", seed=4)
+    rough = surface_facets(replace(surface, mean_vertices=surface.vertices))
+    assert facets_visible(build_scene([surface]), rough, place).mean() < 0.9
+    assert error(echo(scene).samples, as_a_whole(scene)) <= 1e-3
 
 
 def test_in_two_dimensions_each_receiver_looks_at_the_sample_too() -> None:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario, parse_scenario
@@ -78,7 +79,8 @@ def by_numpy(
     surface: Surface, material: Material, transmit: Port, receive: Port, antenna: Antenna,
     lit: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
-    facets = surface_facets(surface, material)
+    middle = 2 * speed_of_light / (FREQUENCIES[0] + FREQUENCIES[-1])
+    facets = surface_facets(surface, material, wavelength=middle)
     seen = np.ones((1, facets.count), dtype=bool) if lit is None else lit[None]
     ports = [
         Ports(positions=p.position[None], pattern=antenna_pattern(antenna, p.aim), visible=seen)

@@ -1,0 +1,43 @@
+"""Weights of rough triangles beyond the tangent plane, in NumPy."""
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from simulator.geometry.facets import Facets
+from simulator.materials.layered_media import Material
+from simulator.materials.reflection_coefficients import Legs
+from simulator.numerics.vectors import added, dot
+from simulator.scattering.weighted_curvature import curvature_weight, scattering_kernel
+
+
+def rough_weights(
+    facets: Facets,
+    side: Float[np.ndarray, " facets"],
+    legs: Legs,
+    material: Material,
+    permittivity: complex,
+    share: float,
+) -> Float[np.ndarray, " facets"] | Complex[np.ndarray, " facets"]:
+    """Work out what roughness adds to obliquity times reflection, over the facets' areas.
+
+    Parameters
+    ----------
+    facets
+        Triangles that are rough.
+    side
+        1 where the antennas are on the normals' side, -1 on the other.
+    legs
+        To both antennas.
+    material, permittivity
+        What the facets are made of.
+    share
+        See :class:`simulator.geometry.facets.Relief`.
+    """
+    if facets.relief is None:
+        raise ValueError("smooth facets have no curvature weight; give facets with a relief")
+    mean = np.multiply(facets.relief.normals.T, side, dtype=np.float64)
+    normals = facets.normals.T * side
+    upright = dot(mean, normals)
+    slope = added(mean, normals, -1.0 / upright)
+    kernel = scattering_kernel(material, legs, permittivity)
+    return np.asarray(upright * curvature_weight(kernel, legs, mean, slope, share))
