@@ -30,7 +30,7 @@ does. [-]"""
 ON_PLANE = 3.0
 """Distance from a plane within which what is seen belongs to it. [cells]"""
 FEWEST_VOXELS = 3
-"""Pixels of the survey, 0.44 cells apart, that a target must fill: fewer are one speckle's tip."""
+"""Pixels of the survey, 0.49 cells apart, that a target must fill: fewer are one speckle's tip."""
 
 
 @dataclass(frozen=True, kw_only=True)
