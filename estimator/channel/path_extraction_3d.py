@@ -24,6 +24,9 @@ from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront, wavefront_field
 
+WIDEST = 0.95
+"""Largest sum of squared cosines of a grating lobe that is tried: 13° from the array's plane.
+[-]"""
 ORDERS = (-1, 0, 1)
 """Grating lobes, along each axis, at which a wave may really have arrived."""
 
@@ -120,7 +123,7 @@ def _best_lobe(
     wavelength = speed_of_light / float(near.frequencies.mean())
     for order in np.stack(np.meshgrid(ORDERS, ORDERS, indexing="ij"), axis=-1).reshape(-1, 2):
         lobe = np.array(cosines) + order * wavelength / np.array(array.spacing)
-        if float(lobe @ lobe) < 0.95:
+        if float(lobe @ lobe) < WIDEST:
             starts.append(
                 search_wavefront(near, cosines=(float(lobe[0]), float(lobe[1])), path_length=length)
             )

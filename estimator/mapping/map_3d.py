@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from estimator import false_alarm
 from estimator.array.array_frame import ArrayFrame
-from estimator.array.planar_array import WIDEST_SINE, PlanarArray, planar_resolution
+from estimator.array.linear_array import WIDEST_SINE
+from estimator.array.planar_array import PlanarArray, planar_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.specular_chains import Chain, chain_to, unfolded_over
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
@@ -28,7 +29,15 @@ STANDS_OUT = 25.0
 """Intensity over the background's that a target must reach: of pure background one voxel in 1e10
 does. [-]"""
 ON_PLANE = 3.0
-"""Distance from a plane within which what is seen belongs to it. [cells]"""
+"""Distance from a plane within which what is seen belongs to it, or another wall's centre if both
+are one: twice the survey's main lobe, which ends at 1.4. [cells]"""
+SAME_NORMAL = 0.95
+"""Product of two normals from which walls within :data:`ON_PLANE` are one: 18°. [-]"""
+NEIGHBOURS = 9
+"""Side of the neighbourhood of a voxel in which it must not be a skirt. [pixels]"""
+SKIRT = 0.03
+"""Intensity over the brightest voxel's in that neighbourhood (−15 dB), below which a voxel belongs
+to that one's main lobe: the lobe falls so far 0.93 cells from its peak. [-]"""
 FEWEST_VOXELS = 3
 """Pixels of the survey, 0.49 cells apart, that a target must fill: fewer are one speckle's tip."""
 
@@ -189,7 +198,7 @@ def mirrored_wall(wall: PlaneWall, mirror: PlaneWall) -> PlaneWall:
 def _coincide(wall: PlaneWall, other: PlaneWall, resolution: Resolution) -> bool:
     beside = abs(float((wall.centre - other.centre) @ other.normal))
     cell = float(resolution.cell(wall.centre, other.normal))
-    return beside < 3 * cell and abs(float(wall.normal @ other.normal)) > 0.95
+    return beside < ON_PLANE * cell and abs(float(wall.normal @ other.normal)) > SAME_NORMAL
 
 
 def _targets(
@@ -215,9 +224,8 @@ def _targets(
         return ()
     strongest = float(intensity[free].max())
     bright = free & (intensity > TARGET_LEVEL * strongest)
-    # What is a thousandth of the brightest voxel near it may be that one's sidelobe.
-    around = scipy.ndimage.maximum_filter(intensity, size=9)
-    bright &= intensity > 0.03 * around
+    around = scipy.ndimage.maximum_filter(intensity, size=NEIGHBOURS)
+    bright &= intensity > SKIRT * around
     if len(looked.lobes):
         lobes = cKDTree(looked.lobes)
         tops = np.argwhere(bright & (intensity == scipy.ndimage.maximum_filter(intensity, size=3)))
