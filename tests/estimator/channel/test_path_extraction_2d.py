@@ -64,7 +64,7 @@ def test_two_paths_are_told_apart_with_their_shares(world: Any) -> None:
     assert first.specular
     assert second.specular
     np.testing.assert_allclose(
-        np.degrees([first.wave.bearing[0], second.wave.aoa]), [70.0, 100.0], atol=0.02
+        np.degrees([first.wave.bearing[0], second.wave.bearing[0]]), [70.0, 100.0], atol=0.02
     )
     np.testing.assert_allclose(
         [first.wave.path_length, second.wave.path_length], [0.3, 0.42], atol=1e-4
@@ -80,7 +80,7 @@ def test_a_wave_that_an_edge_scatters_is_rounder_than_its_delay(behind: float, w
     path = max(waves(world, samples), key=lambda one: one.share)
     assert not path.specular
     assert path.dealiased_length is None
-    assert path.free.radius == pytest.approx(0.15, rel=0.02)
+    assert path.radius == pytest.approx(0.15, rel=0.02)
     assert path.free.path_length == pytest.approx(0.15 + behind, abs=1e-3)
 
 
