@@ -430,3 +430,26 @@ def test_a_user_without_a_position_has_no_predicted_channel() -> None:
     frame = array_frame(np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.array([0.0, 1.0, 0.0]))
     with pytest.raises(ValueError, match="'bob' is not_found"):
         predict_user_channel(Estimate(users=(nobody,), mirrors=()), nobody, frame, frequency=1e9)
+
+
+@pytest.mark.parametrize("max_bounces", [0, 1, 2, 3, 8])
+def test_between_parallel_walls_paths_have_as_many_bounces_as_asked_for(max_bounces: int) -> None:
+    # Array and user stand between two long walls: a path of each length over either wall first.
+    walls = [wall(-0.5, 0.0, 90.0, 40.0), wall(0.5, 0.0, 90.0, 40.0)]
+    paths = predict_channel(
+        at(0.1, 1.5), EXACT, walls, frequency=FREQUENCY, max_bounces=max_bounces
+    )
+    counts = sorted(len(path.walls) for path in paths)
+    assert counts == [0] + [n for n in range(1, max_bounces + 1) for _ in range(2)]
+    for path in paths:
+        # The n-th image stands n metres farther aside, in the closed form of two parallel mirrors.
+        turns = len(path.walls)
+        first = -1 if turns and path.walls[0] == 0 else 1
+        aside = first * turns + 0.1 * (-1) ** turns
+        assert path.path_length == pytest.approx(np.hypot(aside, 1.5), rel=1e-12)
+
+
+@pytest.mark.parametrize("max_bounces", [-1, 9])
+def test_bounces_that_are_not_followed_are_refused(max_bounces: int) -> None:
+    with pytest.raises(ValueError, match=f"max_bounces = {max_bounces}: chains of 0 to 8 mirrors"):
+        predict_channel(at(0.1, 1.5), EXACT, [], frequency=FREQUENCY, max_bounces=max_bounces)
