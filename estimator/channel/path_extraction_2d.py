@@ -54,7 +54,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
     energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
     # A matched filter's output of noise is exponential: this is passed by chance in one map
     # of a million.
-    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=first_map.values.size)
+    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=float(first_map.values.size))
     found: FittedWaves | None = None
     residual, this_map = uplink, first_map
     while found is None or len(found.waves) < MOST_PATHS:

@@ -55,7 +55,7 @@ def find_space_paths(
     """
     noise = noise_variance(uplink.samples)
     energy = float(np.sum(np.abs(uplink.samples) ** 2)) - noise * uplink.samples.size
-    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=first_map.values.size)
+    least = noise * false_alarm.threshold(false_alarm.WAVE, cells=float(first_map.values.size))
     step = float(uplink.frequencies[1] - uplink.frequencies[0])
     cell = speed_of_light / float(np.ptp(uplink.frequencies))
     paths: list[Path] = []
