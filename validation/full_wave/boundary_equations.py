@@ -22,8 +22,9 @@ outside, :math:`\rho = 1` (TM) or :math:`\varepsilon` (TE). Outer and inner equa
 the inner ones times :math:`1/\rho` and 1, so that the poles of :math:`S` (both) and :math:`N`
 cancel:
 
-.. math:: f_e - \tfrac1\rho (D_i u + \rho k S_i q) - \tfrac12 (1 + \tfrac1\rho) u &= -u_i \\
-          g_e - (N_i u + \rho k K'_i q)/k + \tfrac12 (1 + \rho) q &= -\partial_n u_i / k
+.. math:: f_e - \tfrac1\rho (D_i u + \rho k S_i q) - \tfrac12 (1 + \tfrac1\rho) u = -u_i
+
+.. math:: g_e - (N_i u + \rho k K'_i q)/k + \tfrac12 (1 + \rho) q = -\partial_n u_i / k
 
 Rows and unknowns are weighted by the square root of the arc length, on TE conductors by the arc
 length, over its largest step, where N would grow without bound towards a corner. They are ordered

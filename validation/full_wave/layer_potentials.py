@@ -24,12 +24,12 @@ from point to point gets
 :math:`\sum_{n \ne 0} e^{j\omega n}/n^2 = \pi^2/3 - \pi|\omega| + \omega^2/2` from the rule and
 should get :math:`-\pi|\omega|`, so
 
-.. math:: N_{ii} \mathrel{-}= \frac{\pi}{6 w_i} - \frac{h^2 \{s\}_i}{12 \pi w_i}
-          - \frac{w_i \kappa_i^2}{24\pi}, \qquad
-          N_{ij} \mathrel{+}= \frac{d_{|i-j|}}{4\pi w_i}
+.. math:: \Delta N_{ii} = -\frac{\pi}{6 w_i} + \frac{h^2 S_i}{12 \pi w_i}
+          + \frac{w_i \kappa_i^2}{24\pi}, \qquad
+          \Delta N_{ij} = \frac{d_{|i-j|}}{4\pi w_i}
 
 with the arc length :math:`w = h\,ds/d\theta` of a point's step, the Schwarzian derivative
-:math:`\{s\}` of the arc length over the parameter, the curvature :math:`\kappa`, and the second
+:math:`S` of the arc length over the parameter, the curvature :math:`\kappa`, and the second
 difference :math:`d`, of reach 14, that takes a wave to :math:`-\omega^2`. On a closed curve the
 diagonal follows instead from a constant density, whose static field is constant inside and 0
 outside; this holds at corners, too.
