@@ -1,6 +1,11 @@
 """The simulator against full-wave solutions, stored ones and our own."""
 
-from validation.experiments import full_wave_localization, full_wave_roughness, full_wave_wall
+from validation.experiments import (
+    full_wave_bodies,
+    full_wave_localization,
+    full_wave_roughness,
+    full_wave_wall,
+)
 from validation.full_wave.ghost_comparison import LEAST_CORRELATION as GHOST_CORRELATION
 from validation.full_wave.ghost_comparison import MOST_LEVEL_DB as GHOST_LEVEL_DB
 from validation.full_wave.ghost_comparison import compare_ghosts
@@ -72,7 +77,9 @@ def ghosts(effort: Effort, tell: Tell) -> Finding:
 def solver(effort: Effort, tell: Tell) -> Finding:
     """Check our own method of moments against series, refinement and the stored solution."""
     found = full_wave_wall.solver_check()
-    tell(1, 1)
+    tell(1, 2)
+    bodies = full_wave_bodies.body_errors()
+    tell(2, 2)
     return Finding(
         rows=[
             Row(
@@ -95,6 +102,16 @@ def solver(effort: Effort, tell: Tell) -> Finding:
                 measured=found.reference_error,
                 high=full_wave_wall.MOST_REFERENCE_ERROR,
                 origin="the wall's profile is interpolated between its 8001 points by either",
+            ),
+            *(
+                Row(
+                    name=f"integral equations: {one.name}, relative error",
+                    stated="Airy's formula" if one.reference == "Airy" else "Bessel series",
+                    measured=one.error,
+                    high=one.most,
+                    origin="the grid, and what comes back from the ends of slabs and faces",
+                )
+                for one in bodies
             ),
         ]
     )
