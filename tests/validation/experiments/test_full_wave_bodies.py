@@ -19,7 +19,7 @@ def test_too_few_points_break_the_claim(monkeypatch: pytest.MonkeyPatch) -> None
     one = module.BodyError(
         name="cylinder", error=error, most=module.MOST_SERIES_ERROR, reference="series"
     )
-    with pytest.raises(RuntimeError, match="cylinder: .* is claimed"):
+    with pytest.raises(RuntimeError, match=r"cylinder: .* is claimed"):
         module.check((one,))
     module.check(
         (module.BodyError(name="one", error=np.finfo(float).eps, most=1e-7, reference="series"),)
