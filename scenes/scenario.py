@@ -337,7 +337,7 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
 
 
 def _polarization_problems(scenario: Scenario) -> list[str]:
-    """In two dimensions the field is along z."""
+    """In two dimensions radio.polarization is that of all antennas."""
     station, found = scenario.base_station, []
     antennas = {"base_station.antenna": station.antenna}
     if station.transmitter is not None and station.transmitter.antenna is not None:
@@ -346,8 +346,8 @@ def _polarization_problems(scenario: Scenario) -> list[str]:
     for key, antenna in antennas.items():
         if antenna.polarization_deg != 0.0:
             found.append(
-                f"{key}.polarization = {antenna.polarization!r}: in two dimensions the field is "
-                "along z; leave it out ('vertical'), or set dimensions = 3"
+                f"{key}.polarization = {antenna.polarization!r}: in two dimensions all antennas "
+                "have one; leave it out and set radio.polarization, or set dimensions = 3"
             )
         if antenna.cross_polar_db is not None:
             found.append(

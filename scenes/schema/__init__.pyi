@@ -2,6 +2,7 @@ from .antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
 from .base_station import BaseStation
 from .directions import unit_vector
 from .errors import ScenarioError, did_you_mean, problems, shown
+from .height_map import HeightMap, read_height_map
 from .impairments import Impairments
 from .materials import Slab, usual_texture
 from .multistatic import Arc, Places, Transmitter
@@ -10,7 +11,7 @@ from .permittivity_table import band_problem, read_permittivity_table, table_pro
 from .point_target import PointTarget
 from .quantities import Checked, Name, Position
 from .radio import Radio
-from .roughness import Roughness, Spectrum
+from .roughness import Distribution, Roughness, Scale, Spectrum
 
 __all__ = [
     "Antenna",
@@ -22,7 +23,9 @@ __all__ = [
     "Cosine",
     "Cylinder",
     "Directive",
+    "Distribution",
     "GaussianBeam",
+    "HeightMap",
     "Horn",
     "Impairments",
     "Isotropic",
@@ -34,6 +37,7 @@ __all__ = [
     "Position",
     "Radio",
     "Roughness",
+    "Scale",
     "ScenarioError",
     "SceneObject",
     "Slab",
@@ -43,6 +47,7 @@ __all__ = [
     "did_you_mean",
     "largest_size",
     "problems",
+    "read_height_map",
     "read_permittivity_table",
     "shown",
     "smallest_size",

@@ -1,5 +1,14 @@
 from .faces import Face, scattering_faces
-from .facets import Facets, joined, profile_surface, scene_facets, surface_facets
+from .facets import (
+    Facets,
+    Group,
+    Relief,
+    is_rough,
+    joined,
+    profile_surface,
+    scene_facets,
+    surface_facets,
+)
 from .mean_surfaces import mean_mirrors, rms_height
 from .mirrors import Mirrors, dot, line_mirrors
 from .patches import Patches, cut_into_patches, patch_side
@@ -8,13 +17,16 @@ from .ray_scene import blocked, build_scene, facets_visible
 __all__ = [
     "Face",
     "Facets",
+    "Group",
     "Mirrors",
     "Patches",
+    "Relief",
     "blocked",
     "build_scene",
     "cut_into_patches",
     "dot",
     "facets_visible",
+    "is_rough",
     "joined",
     "line_mirrors",
     "mean_mirrors",

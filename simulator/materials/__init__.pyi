@@ -18,12 +18,15 @@ from .permittivity import (
     read_permittivity,
 )
 from .reflection_coefficients import (
+    Legs,
+    Shares,
     angle_class,
+    conductor_mirror,
     echo_coefficient,
     facet_coefficients,
     half_angle_cosine,
+    mirror_shares,
     reflection_nodes,
-    vertical_polarization,
 )
 from .sionna_materials import radio_material, scattering_coefficient, sionna_slab
 
@@ -32,16 +35,20 @@ __all__ = [
     "Conductor",
     "ConstantPermittivity",
     "Dielectric",
+    "Legs",
     "Material",
     "MaterialError",
     "Permittivity",
     "PowerLawPermittivity",
+    "Shares",
     "TabulatedPermittivity",
     "angle_class",
+    "conductor_mirror",
     "echo_coefficient",
     "facet_coefficients",
     "half_angle_cosine",
     "itu_permittivity",
+    "mirror_shares",
     "named_material",
     "radio_material",
     "read_permittivity",
@@ -51,5 +58,4 @@ __all__ = [
     "sionna_slab",
     "slab",
     "transmission",
-    "vertical_polarization",
 ]

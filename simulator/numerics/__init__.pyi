@@ -6,15 +6,23 @@ from .nufft_sum import (
     lagrange_basis,
     nodes_needed,
 )
+from .vectors import added, at_least, chosen, cross, dot, scaled, square_root
 
 __all__ = [
     "FrequencySum",
     "LinkPlan",
+    "added",
+    "at_least",
     "barycentric_basis",
     "chebyshev_nodes",
+    "chosen",
+    "cross",
+    "dot",
     "lagrange_basis",
     "nodes_needed",
     "phasor",
     "plan_links",
+    "scaled",
+    "square_root",
     "sum_planned",
 ]

@@ -87,6 +87,13 @@ PLANTED = (
         claims=("facet_grid",),
     ),
     PlantedError(
+        name="Bragg kernel of the other polarization",
+        file="simulator/scattering/weighted_curvature.py",
+        right="return self._constant + 2.0 * (one * other - fields)",
+        wrong="return self._constant + 2.0 * (fields - one * other)",
+        claims=("rough_plate_in_space",),
+    ),
+    PlantedError(
         name="random phases at every position",
         file="simulator/response/echo.py",
         right="    return np.asarray(echo + ghosts)\n",
