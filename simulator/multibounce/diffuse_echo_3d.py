@@ -181,7 +181,8 @@ class _Target:
     ) -> Int[np.ndarray, " lit"]:
         facets = self.facets
         sides = [
-            np.einsum("fx,fx->f", place - facets.centres, facets.normals) for place in (one, other)
+            np.einsum("fx,fx->f", place - facets.centres, facets.mean_normals)
+            for place in (one, other)
         ]
         front: Bool[np.ndarray, " facets"] = facets.two_sided | (sides[0] > 0)
         return np.flatnonzero(front & (sides[0] * sides[1] > 0))
@@ -196,9 +197,10 @@ class _Target:
         centres = self.facets.centres[lit]
         ways = np.linalg.norm(centres - one, axis=-1) + np.linalg.norm(centres - other, axis=-1)
         best = lit[int(np.argmin(ways))]
-        normal = self.facets.normals[best]
-        side = np.sign(((one - self.facets.centres[best]) * normal).sum())
-        centre: np.ndarray = self.facets.centres[best] + OFF_TARGET * side * normal
+        # Off the mean surface, which rays meet.
+        place, normal = self.facets.places[best], self.facets.mean_normals[best]
+        side = np.sign(((one - place) * normal).sum())
+        centre: np.ndarray = place + OFF_TARGET * side * normal
         return centre
 
     def _coherent(
@@ -279,7 +281,7 @@ class _Target:
     ) -> Complex[np.ndarray, "places freqs"]:
         """Sum the target's facets from places to one end, over the links with the centre. [-]."""
         frequencies, facets = self.scene.scenario.radio.frequencies, self.facets
-        height = np.einsum("fx,fx->f", end - facets.centres, facets.normals)
+        height = np.einsum("fx,fx->f", end - facets.centres, facets.mean_normals)
         links = Links(
             senders=np.broadcast_to(end, places.shape),
             receivers=places,

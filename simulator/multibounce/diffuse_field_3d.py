@@ -309,6 +309,7 @@ def _on_mean_plane(facets: Facets, mirrors: Mirrors, mirror: int) -> Facets:
         normals=across / doubled[:, None],
         sizes=doubled / 2,
         edges=edges,
+        relief=None,
     )
 
 

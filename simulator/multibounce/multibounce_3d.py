@@ -166,8 +166,8 @@ class _Target:
         """Trace one facet of each patch over a leg, from every antenna: what faces them most."""
         facets = self.facets.part(order)
         towards = leg.image(sight).centre - facets.centres
-        facing = np.abs(np.einsum("fx,fx->f", towards, facets.normals))
-        front = facets.two_sided | (np.einsum("fx,fx->f", towards, facets.normals) > 0)
+        facing = np.abs(np.einsum("fx,fx->f", towards, facets.mean_normals))
+        front = facets.two_sided | (np.einsum("fx,fx->f", towards, facets.mean_normals) > 0)
         facing = np.where(front, facing, -1.0)
         most = np.repeat(np.maximum.reduceat(facing, first[:-1]), np.diff(first))
         candidates = np.flatnonzero(facing == most)
@@ -177,10 +177,10 @@ class _Target:
             self.mirrors,
             leg.sequence,
             sight.positions,
-            facets.centres[best],
+            facets.places[best],
             blocked=partial(blocked, self.scene.rays),
             clearance=self.scene.rays.clearance,
-            receiver_offsets=self.scene.rays.clearance * facets.normals[best],
+            receiver_offsets=self.scene.rays.clearance * facets.mean_normals[best],
         )
         return chain.valid
 
