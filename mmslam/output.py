@@ -1,15 +1,30 @@
-"""Where results go: written aside and renamed at the end, so nothing is ever half-written."""
+"""Where results go: written aside and exchanged at the end, so nothing is ever half-written.
+
+Beside ``NAME`` lies ``.NAME.mmslam`` while a command works::
+
+    lock            held by the command, so that no other one works on the same output
+    new             what is being written
+    whole-INODE     what is written, about to take its place; after the exchange, what it replaced
+    replaced        the same, where two names cannot be exchanged in one step
+
+A command that is killed leaves that folder behind, and the next one on the same output puts back
+what was out of its place, whatever the moment.
+"""
 
 import errno
+import hashlib
 import json
 import os
 import shutil
-import tempfile
+import stat
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+from estimator.measurement.atomic_rename import exchange, rename_new
+from estimator.measurement.file_lock import file_lock
 
 RESULT = "result.json"
 MEASUREMENT = "measurement.zarr"
@@ -19,6 +34,12 @@ TRACK_FIGURE = "track.png"
 FORMAT = 1
 
 FIGURES = ("raw_image.png", "corrected_image.png", "angle_range_map.png", "localization.png")
+
+LONGEST_NAME = 255
+"""Longest file name of common file systems. [byte]"""
+
+Refusal = Callable[[Path], str | None]
+"""Says why a folder that is already there must not be replaced; None: it may be."""
 
 _SETTLING = 0.05  # how long late writers are given after each removal [s]
 _ABSENCES = 4  # how often the folder must then be found absent
@@ -37,6 +58,7 @@ _PLACE_ERRORS = {
     errno.ENAMETOOLONG: "the name is too long",
     errno.EBUSY: "it is in use",
     errno.ENOTEMPTY: "another program is writing there",
+    errno.ELOOP: "it is a link that leads nowhere, or in a circle",
 }
 
 
@@ -45,17 +67,18 @@ class OutputError(ValueError):
 
 
 @contextmanager
-def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[Path]:
+def replacing(target: Path, refusal: Refusal) -> Iterator[Path]:
     """Give a path whose folder takes the place of ``target`` once the block has ended well.
 
-    If the block fails or is interrupted, ``target`` and its parents are as they were.
+    If the block fails, is interrupted or killed, ``target`` is as it was; what is there at the
+    end is looked at again before it is replaced.
 
     Parameters
     ----------
     target
         Where the folder shall be in the end; links are followed.
     refusal
-        Says why something that is already there must not be replaced (None: it may be).
+        Says why something that is already there must not be replaced.
 
     Yields
     ------
@@ -64,35 +87,93 @@ def replacing(target: Path, refusal: Callable[[Path], str | None]) -> Iterator[P
     Raises
     ------
     OutputError
-        Before the block: if ``target`` must not be replaced or cannot be written beside;
-        after it: if the disk was full.
+        Before the block: if ``target`` must not be replaced or cannot be written beside, or
+        another command works on it. After it: if the disk was full, or if somebody has put
+        something else there in the meantime; then the new folder is kept beside it.
     """
-    target = target.resolve()
-    missing: list[Path] = []
-    aside: Path | None = None
-    try:
+    target = _resolved(target)
+    with reserved(target, refusal) as aside:
         _check_replaceable(target, refusal)
+        yield aside / "new"  # `aside` is closed to others, this one need not be
+        _put_in_place(aside, target, refusal)
+
+
+@contextmanager
+def new_file(target: Path) -> Iterator[Path]:
+    """Give a path whose file becomes ``target`` once the block has ended well.
+
+    Raises
+    ------
+    OutputError
+        As of :func:`replacing`; a file that is already there is never replaced.
+    """
+    target = _resolved(target)
+
+    def refusal(found: Path) -> str:
+        return "it is not empty"
+
+    with reserved(target, refusal) as aside:
+        if os.path.lexists(target):
+            raise OutputError(f"{target} exists; move it away or choose another name")
+        yield aside / "new"
+        _put_in_place(aside, target, refusal)
+
+
+@contextmanager
+def reserved(target: Path, refusal: Refusal = lambda found: None) -> Iterator[Path]:
+    """Keep other commands from an output while the block runs.
+
+    What a killed command left out of its place is put back first.
+
+    Parameters
+    ----------
+    target
+        The output.
+    refusal
+        Says what of a killed command's must not be removed.
+
+    Yields
+    ------
+    A folder beside it, closed to others, that is removed in the end.
+
+    Raises
+    ------
+    OutputError
+        If another command works on it, or it cannot be written beside.
+    """
+    target = _resolved(target)
+    aside = _beside(target)
+    missing: list[Path] = []
+    with _place_errors_told(target):
+        with suppress(FileNotFoundError):
+            target.lstat()  # a name that is too long is told before any work
         missing = [parent for parent in target.parents if not parent.exists()]
-        target.parent.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=f".{target.name[:60]}-", dir=target.parent))
-        new = aside / "new"  # mkdtemp's own folder is closed to others, this one need not be
-        yield new
-        _exchange(new, target, aside / "old")
-        shutil.rmtree(aside, ignore_errors=True)
-    except OSError as error:
-        reason = _PLACE_ERRORS.get(error.errno or 0)
-        if reason is None:
-            raise
-        raise OutputError(
-            f"cannot write {target}: {reason} ({error.strerror}); free it or choose another "
-            "place (nothing was left behind)"
-        ) from error
-    finally:
-        if aside is not None and aside.exists():
-            _remove(aside)
-        for parent in missing:  # innermost first; stops at the first that is not empty
-            with suppress(OSError):
-                parent.rmdir()
+        try:
+            _refuse_strangers(aside)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with file_lock(aside / "lock", mode=0o700) as held:
+                if not held:
+                    raise OutputError(
+                        f"{target} is being written by another mmslam command; wait until that "
+                        "has ended, or choose another place"
+                    )
+                try:
+                    _recover(aside, target, refusal)
+                    yield aside
+                except BaseException:
+                    _recover(aside, target, refusal)
+                    _empty(aside, settled=False)
+                    raise
+                else:
+                    _empty(aside, settled=True)
+                finally:  # the lock last: whoever comes now must not find ours
+                    (aside / "lock").unlink(missing_ok=True)
+                    with suppress(OSError):
+                        aside.rmdir()
+        finally:
+            for parent in missing:  # innermost first; stops at the first that is not empty
+                with suppress(OSError):
+                    parent.rmdir()
 
 
 def refuse_to_replace_input(folder: Path, path: Path) -> None:
@@ -145,51 +226,187 @@ def refuse_foreign_store(folder: Path) -> str | None:
     return None
 
 
-def _remove(folder: Path) -> None:
-    """Remove a folder that threads may still write to: Zarr's go on after a failure."""
+@contextmanager
+def _place_errors_told(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = _PLACE_ERRORS.get(error.errno or 0)
+        if reason is None:
+            raise
+        raise OutputError(
+            f"cannot write {target}: {reason} ({error.strerror}); free it or choose another "
+            "place (nothing was left behind)"
+        ) from error
+
+
+def _resolved(target: Path) -> Path:
+    try:
+        return target.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null character
+        raise OutputError(f"{target}: {error}; choose another place") from None
+
+
+def _beside(target: Path) -> Path:
+    name = f".{target.name}.mmslam"
+    if len(os.fsencode(name)) > LONGEST_NAME:
+        digest = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
+        name = f".{target.name[:40]}-{digest}.mmslam"
+    return target.parent / name
+
+
+def _refuse_strangers(aside: Path) -> None:
+    """Refuse a folder that somebody else has put there, or a link: what is in it would be removed.
+
+    Its name can be foreseen, and others may write to the folder it lies in.
+    """
+    try:
+        found = aside.lstat()
+    except FileNotFoundError:
+        return
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid():
+        raise OutputError(
+            f"{aside} is needed for what is being written, and is a link, a file or another "
+            "user's folder; remove it or choose another place"
+        )
+
+
+def _put_in_place(aside: Path, target: Path, refusal: Refusal) -> None:
+    """Give what was written its name, if what has that name now may be replaced."""
+    new = aside / "new"
+    whole = aside / f"whole-{new.stat().st_ino}"
+    new.rename(whole)
+    with suppress(FileExistsError):
+        rename_new(whole, target)
+        return
+    reason = _why_kept(target, refusal)
+    if reason is None and exchange(whole, target):
+        reason = _why_kept(whole, refusal)  # looked at where nobody changes it any more
+        if reason is None:
+            _discard(whole)
+            return
+        exchange(whole, target)
+    elif reason is None:
+        reason = _exchange_by_renames(aside, whole, target, refusal)
+    if reason is None:
+        return
+    kept = _kept_beside(whole, target)
+    raise OutputError(
+        f"{target} was changed while the command worked, and is left as it is: {reason}; what "
+        f"was to go there is {kept}"
+    )
+
+
+def _exchange_by_renames(aside: Path, whole: Path, target: Path, refusal: Refusal) -> str | None:
+    """Exchange by two renames, and back if what was there must not be replaced; return why."""
+    replaced = aside / "replaced"
+    target.rename(replaced)
+    reason = _why_kept(replaced, refusal)
+    if reason is None:
+        try:
+            rename_new(whole, target)
+        except FileExistsError:
+            kept = _kept_beside(replaced, target)
+            return f"somebody has put something else there (the earlier result is {kept})"
+        _discard(replaced)
+        return None
+    rename_new(replaced, target)
+    return reason
+
+
+def _kept_beside(whole: Path, target: Path) -> Path:
+    for number in range(1, 1000):
+        kept = target.with_name(f"{target.stem[:40]}-new{number}{target.suffix[:10]}")
+        with suppress(FileExistsError):
+            rename_new(whole, kept)
+            return kept
+    raise OutputError(f"{target}: too many of its neighbours are called -new…; remove some")
+
+
+def _recover(aside: Path, target: Path, refusal: Refusal) -> None:
+    """Put back what a command that ended in between left out of its place; remove its own.
+
+    Raises
+    ------
+    OutputError
+        If something lies there that can neither be put back nor is ours to remove.
+    """
+    replaced = aside / "replaced"
+    in_place = True
+    for whole in aside.glob("whole-*"):
+        inode = int(whole.name.partition("-")[2])
+        if whole.lstat().st_ino == inode:  # never came into its place
+            in_place = False
+            if replaced.exists() and not target.exists():
+                rename_new(replaced, target)
+        elif _why_kept(whole, refusal) is not None:
+            # It was exchanged against what must not be replaced. Back, if nobody has touched
+            # the new one since.
+            if not os.path.lexists(target):
+                rename_new(whole, target)
+            elif (
+                target.lstat().st_ino != inode
+                or _why_kept(target, refusal) is not None
+                or not exchange(whole, target)
+            ):
+                raise _left_over(whole, target)
+        _discard(whole)
+    if os.path.lexists(replaced):
+        if not os.path.lexists(target):
+            rename_new(replaced, target)
+        elif not in_place or _why_kept(replaced, refusal) is not None:
+            raise _left_over(replaced, target)
+        _discard(replaced)
+    _discard(aside / "new")
+
+
+def _left_over(found: Path, target: Path) -> OutputError:
+    kept = _kept_beside(found, target)
+    return OutputError(
+        f"{target} was changed while a command that was killed worked on it; what had been there "
+        f"is {kept} now: compare them, and remove what you do not need"
+    )
+
+
+def _discard(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _empty(folder: Path, *, settled: bool) -> None:
+    """Remove all but the lock; threads may still write unless all is settled: Zarr's go on."""
     absent = 0
     for _ in range(_MOST_REMOVALS):
-        if folder.exists():
-            shutil.rmtree(folder, ignore_errors=True)
-            absent = 0
-        elif (absent := absent + 1) == _ABSENCES:
+        left = [entry for entry in folder.iterdir() if entry.name != "lock"]
+        for entry in left:
+            _discard(entry)
+        absent = 0 if left else absent + 1
+        if settled or absent == _ABSENCES:
             return
         time.sleep(_SETTLING)
 
 
-def _check_replaceable(target: Path, refusal: Callable[[Path], str | None]) -> None:
-    reason = None
-    if target.exists():
-        if not target.is_dir():
-            reason = "it is a file"
-        elif os.path.ismount(target) or Path.cwd().is_relative_to(target):
-            reason = "it is the current folder or a mount point, which cannot be exchanged"
-        else:
-            reason = refusal(target)
-    if reason:
+def _check_replaceable(target: Path, refusal: Refusal) -> None:
+    if os.path.lexists(target) and (reason := _why_kept(target, refusal)):
         raise OutputError(
             f"{target} exists and will not be replaced: {reason}; "
             "move it away or choose another place"
         )
 
 
-def _exchange(new: Path, target: Path, old: Path) -> None:
-    # A folder that is not empty cannot be replaced in one step: move the old one out first,
-    # and back if anything, an interruption included, comes between.
-    replaced = target.exists()
-    try:
-        if replaced:
-            target.rename(old)
-        new.rename(target)
-    except BaseException:
-        if replaced and old.exists() and not target.exists():
-            old.rename(target)
-        raise
+def _why_kept(target: Path, refusal: Refusal) -> str | None:
+    if not target.is_dir():
+        return "it is a file"
+    if os.path.ismount(target) or Path.cwd().is_relative_to(target):
+        return "it is the current folder or a mount point, which cannot be exchanged"
+    return refusal(target)
 
 
 def _json(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return document if isinstance(document, dict) else {}

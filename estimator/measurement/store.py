@@ -19,14 +19,20 @@ the sample could be made. What is the same in all samples has no such dimension.
 
 import shutil
 import tempfile
-from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from zarr.storage import LocalStore, WrapperStore
 
+from estimator.measurement.atomic_rename import exchange, rename_new
+from estimator.measurement.guarded_store import (
+    MOST_VALUES,
+    damage_told,
+    is_store,
+    opened_store,
+    shortened,
+)
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 
 FORMAT = 1
@@ -42,6 +48,20 @@ CONVENTIONS = (
     "x along the array, y boresight, z up"
 )
 """How the numbers of a store are meant."""
+
+
+_MOST_DIGITS = 30  # of a number that a message shows
+
+__all__ = [
+    "CONVENTIONS",
+    "FORMAT",
+    "PARAMETERS",
+    "TRUTH",
+    "is_store",
+    "measurement_to_dataset",
+    "read_measurement",
+    "write_measurement",
+]
 
 
 def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
@@ -110,9 +130,7 @@ def write_measurement(
     """
     path = Path(path)
     if path.exists() and not is_store(path):
-        raise MeasurementError(
-            f"{path} exists and is not a measurement store; move it away or choose another name"
-        )
+        raise _foreign(path)
     missing = [parent for parent in path.parents if not parent.exists()]
     aside: Path | None = None
     try:
@@ -121,15 +139,7 @@ def write_measurement(
         _write_group(aside / "new", measurement_to_dataset(measurement), group=None)
         if truth is not None:
             _write_group(aside / "new", truth, group=TRUTH)
-        # A non-empty folder cannot be replaced in one step: move the old store out first.
-        try:
-            if path.exists():
-                path.rename(aside / "old")
-            (aside / "new").rename(path)
-        except BaseException:
-            if (aside / "old").exists():
-                (aside / "old").rename(path)
-            raise
+        _put_in_place(aside / "new", path)
     finally:
         if aside is not None:
             shutil.rmtree(aside, ignore_errors=True)
@@ -138,9 +148,33 @@ def write_measurement(
                 parent.rmdir()
 
 
-def is_store(path: Path) -> bool:
-    """Tell whether a Zarr v3 group lies at ``path``."""
-    return (path / "zarr.json").is_file()
+def _put_in_place(new: Path, path: Path) -> None:
+    """Exchange a new store for the one that is there, if it is one."""
+    with suppress(FileExistsError):
+        rename_new(new, path)
+        return
+    if is_store(path) and exchange(new, path):
+        if not is_store(new):  # what had been there, changed in the last instant
+            exchange(new, path)
+            raise _foreign(path)
+        return
+    if not is_store(path):
+        raise _foreign(path)
+    # This system exchanges no names: out with the old one, and back if anything comes between.
+    old = new.with_name("old")
+    try:
+        path.rename(old)
+        new.rename(path)
+    except BaseException:
+        if old.exists():
+            old.rename(path)
+        raise
+
+
+def _foreign(path: Path) -> MeasurementError:
+    return MeasurementError(
+        f"{path} exists and is not a measurement store; move it away or choose another name"
+    )
 
 
 def read_measurement(path: Path, *, sample: int | None = None) -> Measurement:
@@ -160,40 +194,13 @@ def read_measurement(path: Path, *, sample: int | None = None) -> Measurement:
         dimensions, or values are not finite.
     """
     path = Path(path)
-    if not path.exists():
-        raise MeasurementError(f"{path}: no such file or folder")
-    if not is_store(path):
-        raise MeasurementError(
-            f"{path}: not a Zarr v3 group (no zarr.json in it); "
-            "`mmslam import` converts measured data into a measurement store"
-        )
-    try:
-        store = _WithoutTruth(LocalStore(path, read_only=True))
+    store = opened_store(path, hidden=(TRUTH, PARAMETERS))  # opening a group asks what is in it
+    with damage_told(path):
         with xr.open_zarr(store, consolidated=False, chunks=None) as lazy:
             if len(lazy.variables) == 0:
                 raise MeasurementError(f"{path}: a Zarr group without arrays; nothing to locate")
             dataset = _one_sample(path, lazy, sample).load()
-    except MeasurementError:
-        raise
-    except Exception as error:  # Zarr, codecs and JSON fail in many ways on a damaged store
-        raise MeasurementError(
-            f"{path}: the store cannot be read ({type(error).__name__}: {error}); "
-            "it may be truncated: write it again"
-        ) from error
-    return _measurement(path, dataset)
-
-
-class _WithoutTruth(WrapperStore[LocalStore]):
-    """A store in which the truth cannot be seen.
-
-    Opening a group asks what lies in it, and so would read the truth's metadata.
-    """
-
-    async def list_dir(self, prefix: str) -> AsyncIterator[str]:
-        """List what lies in a folder, but for the truth in the root."""
-        async for name in super().list_dir(prefix):
-            if prefix.strip("/") or name.strip("/") not in (TRUTH, PARAMETERS):
-                yield name
+        return _measurement(path, dataset)
 
 
 def _write_group(store: Path, dataset: xr.Dataset, *, group: str | None) -> None:
@@ -214,13 +221,25 @@ def _one_sample(path: Path, dataset: xr.Dataset, sample: int | None) -> xr.Datas
     if count is None:
         if sample is not None:
             raise MeasurementError(f"{path}: no 'sample' dimension; leave --sample out")
+        _refuse_too_many(path, dataset)
         return dataset
     if sample is None and count > 1:
         raise MeasurementError(f"{path}: holds {count} samples; choose one, 0…{count - 1}")
     chosen = sample or 0
     if not 0 <= chosen < count:
         raise MeasurementError(f"{path}: sample {chosen} of {count}; it must be 0…{count - 1}")
-    return _without_padding(path, chosen, dataset.isel(sample=chosen).load())
+    one = dataset.isel(sample=chosen)
+    _refuse_too_many(path, one)
+    return _without_padding(path, chosen, one.load())
+
+
+def _refuse_too_many(path: Path, dataset: xr.Dataset) -> None:
+    count = sum(variable.size for variable in dataset.variables.values())
+    if count > MOST_VALUES:
+        raise MeasurementError(
+            f"{path}: a measurement of {count} values, more than {MOST_VALUES}; thin it out, or "
+            "store it in parts"
+        )
 
 
 def _without_padding(path: Path, sample: int, dataset: xr.Dataset) -> xr.Dataset:
@@ -231,8 +250,8 @@ def _without_padding(path: Path, sample: int, dataset: xr.Dataset) -> xr.Dataset
     if "status" in dataset and int(dataset["status"]) != 0:
         why = str(dataset["failure"].values) if "failure" in dataset else ""
         raise MeasurementError(
-            f"{path}: sample {sample} could not be made ({why or 'nobody says why'}); choose "
-            "another one, or make it again with `mmslam dataset --retry-failed`"
+            f"{path}: sample {sample} could not be made ({shortened(why) or 'nobody says why'}); "
+            "choose another one, or make it again with `mmslam dataset --retry-failed`"
         )
     for name, dimensions in _COUNTED.items():
         if name not in dataset:
@@ -275,10 +294,11 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
     version = attributes.get("mmslam_format", FORMAT)
     if version != FORMAT:
         raise MeasurementError(
-            f"{path}: format {version!r}, this program reads {FORMAT}; use a matching version"
+            f"{path}: format {shortened(repr(version))}, this program reads {FORMAT}; use a "
+            "matching version"
         )
     if "echo" not in dataset and "uplink" not in dataset:
-        found = ", ".join(map(str, dataset.data_vars)) or "none"
+        found = shortened(", ".join(map(str, dataset.data_vars)) or "none")
         raise MeasurementError(f"{path}: neither 'echo' nor 'uplink' is there (found: {found})")
     frequencies = _array(path, dataset, "frequency", ("frequency",), float)
     echo = None
@@ -304,7 +324,9 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
         )
     waves = attributes.get("waves", "spherical")
     if waves not in ("spherical", "cylindrical"):
-        raise MeasurementError(f"{path}: waves = {waves!r}; it must be spherical or cylindrical")
+        raise MeasurementError(
+            f"{path}: waves = {shortened(repr(waves))}; it must be spherical or cylindrical"
+        )
     return Measurement(
         echo=echo,
         uplinks=uplinks,
@@ -312,7 +334,7 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
         boresight=_boresight(path, attributes.get("boresight", [0.0, 1.0, 0.0])),
         clock_offset=_number(path, attributes, "clock_offset_s"),
         scenario=None if (name := attributes.get("scenario")) is None else str(name),
-        seed=None if (seed := _number(path, attributes, "seed")) is None else int(seed),
+        seed=_seed(path, attributes),
     )
 
 
@@ -328,7 +350,8 @@ def _array(
     variable = dataset[name]
     if set(variable.dims) != set(dimensions):
         raise MeasurementError(
-            f"{path}: {name!r} has dimensions {variable.dims}; they must be {dimensions}"
+            f"{path}: {name!r} has dimensions {shortened(str(variable.dims))}; they must be "
+            f"{dimensions}"
         )
     if variable.dtype.kind not in "iufc" or (kind is float and variable.dtype.kind == "c"):
         raise MeasurementError(
@@ -345,10 +368,12 @@ def _array(
 def _boresight(path: Path, value: object) -> np.ndarray:
     try:
         boresight = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         boresight = np.zeros(0)
     if boresight.shape != (3,) or not abs(np.linalg.norm(boresight) - 1) < 1e-6:
-        raise MeasurementError(f"{path}: boresight = {value!r}; it must be a unit vector [x, y, z]")
+        raise MeasurementError(
+            f"{path}: boresight = {shortened(repr(value))}; it must be a unit vector [x, y, z]"
+        )
     return boresight
 
 
@@ -356,6 +381,29 @@ def _number(path: Path, attributes: dict[str, object], key: str) -> float | None
     value = attributes.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise MeasurementError(f"{path}: {key} = {value!r}; it must be a finite number")
-    return float(value)
+    try:
+        number = float(value) if isinstance(value, int | float) else np.nan
+    except OverflowError:  # a whole number of some hundred digits
+        number = np.inf
+    if isinstance(value, bool) or not np.isfinite(number):
+        raise MeasurementError(f"{path}: {key} = {_shown(value)}; it must be a finite number")
+    return number
+
+
+def _seed(path: Path, attributes: dict[str, object]) -> int | None:
+    value = attributes.get("seed")
+    if value is None:
+        return None
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= 2**63:
+        raise MeasurementError(
+            f"{path}: seed = {_shown(value)}; it must be a whole number of at most 63 bits"
+        )
+    return value
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, int) and abs(value) >= 10**_MOST_DIGITS:
+        return f"a whole number of more than {_MOST_DIGITS} digits"  # Python writes no huge ones
+    return shortened(repr(value))

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from jaxtyping import Float
-from zarr.storage import LocalStore
 
 from estimator.measurement import model
+from estimator.measurement.guarded_store import damage_told, opened_store
 from estimator.measurement.model import MeasurementError
-from estimator.measurement.store import is_store
+from estimator.measurement.store import PARAMETERS, TRUTH
 from estimator.results.estimate import Progress, UserEstimate
 from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
 from mmslam import output
@@ -24,6 +24,9 @@ from mmslam.results.document import plain, to_json, versions
 from mmslam.results.tracks import Tracks
 from validation.metrics.errors import position_error
 from validation.metrics.truth import read_truth
+
+MOST_TIMES = 1_000_000
+"""Most samples of a track: a day at ten a second. [-]"""
 
 Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
 """Where each user truly is at each time; empty where it is not known."""
@@ -251,13 +254,18 @@ def _point(point: TrackPoint, truth: Float[np.ndarray, " 3"] | None) -> dict[str
 
 
 def _times(path: Path, step: float | None) -> list[float]:
-    if not is_store(path):
-        raise MeasurementError(
-            f"{path}: not a Zarr v3 group (no zarr.json in it); name a dataset with samples"
-        )
-    with xr.open_zarr(LocalStore(path, read_only=True), consolidated=False, chunks=None) as dataset:
+    store = opened_store(path, hidden=(TRUTH, PARAMETERS))
+    with damage_told(path), xr.open_zarr(store, consolidated=False, chunks=None) as dataset:
         count = dataset.sizes.get("sample", 0)
+        if count > MOST_TIMES:
+            raise MeasurementError(
+                f"{path}: {count} samples, more than {MOST_TIMES}; track them in parts"
+            )
         told = dataset["time"].values if "time" in dataset.variables else None
+        if told is not None and told.dtype.kind not in "iuf":
+            raise MeasurementError(
+                f"{path}: 'time' has type {told.dtype}; it must be numbers, in seconds"
+            )
     if count < 2:
         raise MeasurementError(
             f"{path}: a track needs several samples, this store has {max(count, 1)}; "

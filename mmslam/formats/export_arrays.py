@@ -5,7 +5,7 @@ samples at a time, NetCDF takes a dataset of any size; MATLAB's format holds 2 G
 """
 
 import importlib
-import os
+import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,12 +16,20 @@ from typing import Any
 import numpy as np
 import zarr
 
+from estimator.measurement.guarded_store import (
+    MOST_VALUES,
+    damage_told,
+    opened_store,
+    shortened,
+)
 from estimator.measurement.model import MeasurementError
-from estimator.measurement.store import is_store
-from mmslam.output import OutputError
+from mmslam.output import OutputError, new_file
 
 SAMPLES_AT_ONCE = 64
 """Samples that are in memory together while NetCDF is written."""
+
+MOST_ARRAYS = 10_000
+"""Most arrays of a store that is exported. [-]"""
 
 LARGEST_IN_MATLAB = 2**31 - 1
 """Most bytes of one variable in a MATLAB file of version 5. [byte]"""
@@ -31,6 +39,7 @@ LARGEST_IN_MATLAB = 2**31 - 1
 class StoredArray:
     """One variable of a store."""
 
+    store: Path
     group: str  # "" is the root
     name: str
     array: Any  # of Zarr
@@ -43,14 +52,33 @@ class StoredArray:
         shape: tuple[int, ...] = self.array.shape
         return shape if self.samples is None else (len(self.samples), *shape[1:])
 
+    @property
+    def size(self) -> int:
+        """How many values were chosen."""
+        return math.prod(self.shape)
+
     def read(self, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Read what was chosen, or some of the chosen samples."""
-        if self.samples is None:
-            return np.asarray(self.array[...])
-        chosen = list(self.samples[start:stop])
-        if chosen == list(range(chosen[0], chosen[0] + len(chosen))):
-            return np.asarray(self.array[chosen[0] : chosen[0] + len(chosen)])
-        return np.asarray(self.array.oindex[chosen])
+        """Read what was chosen, or some of the chosen samples.
+
+        Raises
+        ------
+        MeasurementError
+            If it cannot be read, or is more than a measurement's.
+        """
+        shape = self.shape
+        chosen = None if self.samples is None else list(self.samples[start:stop])
+        count = self.size if chosen is None else len(chosen) * math.prod(shape[1:])
+        if count > MOST_VALUES:
+            raise MeasurementError(
+                f"{self.store}: {shortened(self.name)} of shape {shape} holds {count} values at "
+                f"once, more than {MOST_VALUES}; choose some samples with --sample"
+            )
+        with damage_told(self.store):
+            if chosen is None:
+                return np.asarray(self.array[...])
+            if chosen == list(range(chosen[0], chosen[0] + len(chosen))):
+                return np.asarray(self.array[chosen[0] : chosen[0] + len(chosen)])
+            return np.asarray(self.array.oindex[chosen])
 
 
 def export_netcdf(store: Path, file: Path, *, samples: Sequence[int] | None = None) -> int:
@@ -82,7 +110,10 @@ def export_netcdf(store: Path, file: Path, *, samples: Sequence[int] | None = No
         ) from error
     root = _opened(store)
     arrays = _arrays(root, store, samples)
-    with _new(file) as part, netcdf.Dataset(part, "w", auto_complex=True) as written:
+    with (
+        _new(file, "NetCDF") as part,
+        netcdf.Dataset(part, "w", auto_complex=True) as written,
+    ):
         written.setncatts(_attributes(root.attrs.asdict()))
         for one in arrays:
             group = written.createGroup(one.group) if one.group else written
@@ -116,7 +147,7 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
     content: dict[str, Any] = {}
     told: dict[str, Any] = {}
     for one in arrays:
-        size = int(np.prod(one.shape)) * one.array.dtype.itemsize
+        size = one.size * one.array.dtype.itemsize
         if size > LARGEST_IN_MATLAB:
             raise OutputError(
                 f"{one.name} has {size / 2**30:.1f} GiB, more than the 2 GiB that MATLAB's format "
@@ -132,27 +163,31 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
             _place(told, one.group)[_identifier(one.name)] = attributes
     about = {_identifier(key): value for key, value in _attributes(root.attrs.asdict()).items()}
     content["attributes"] = {**about, "variables": told}
-    with _new(file) as part:
+    with _new(file, "MATLAB") as part:
         savemat(part, content, do_compression=True, long_field_names=True, appendmat=False)
     return len(arrays)
 
 
 def _opened(store: Path) -> zarr.Group:
-    if not is_store(store):
-        raise MeasurementError(f"{store}: not a Zarr v3 group; name a measurement or a dataset")
-    return zarr.open_group(store, mode="r")
+    guarded = opened_store(store)
+    with damage_told(store):
+        return zarr.open_group(guarded, mode="r")
 
 
 def _arrays(root: zarr.Group, store: Path, samples: Sequence[int] | None) -> list[StoredArray]:
-    found = []
-    for path, array in root.members(max_depth=None):
+    with damage_told(store):
+        members = root.members(max_depth=None)
+    found: list[StoredArray] = []
+    for path, array in members:
         if not isinstance(array, zarr.Array):
             continue
+        if len(found) == MOST_ARRAYS:
+            raise MeasurementError(f"{store}: more than {MOST_ARRAYS} arrays; is it a measurement?")
         group, _, name = path.rpartition("/")
         names = getattr(array.metadata, "dimension_names", None) or ()
         dimensions = tuple(str(one) for one in names)
         if len(dimensions) != array.ndim:
-            raise MeasurementError(f"{store}: {path!r} does not name its dimensions")
+            raise MeasurementError(f"{store}: {shortened(repr(path))} does not name its dimensions")
         chosen: Sequence[int] | None = None
         if dimensions[:1] == ("sample",):
             count = array.shape[0]
@@ -163,7 +198,14 @@ def _arrays(root: zarr.Group, store: Path, samples: Sequence[int] | None) -> lis
                         f"{store}: sample {sample} of {count}; it must be 0…{count - 1}"
                     )
         found.append(
-            StoredArray(group=group, name=name, array=array, dimensions=dimensions, samples=chosen)
+            StoredArray(
+                store=store,
+                group=group,
+                name=name,
+                array=array,
+                dimensions=dimensions,
+                samples=chosen,
+            )
         )
     if samples is not None and all(one.samples is None for one in found):
         raise MeasurementError(f"{store}: no 'sample' dimension; leave --sample out")
@@ -171,21 +213,27 @@ def _arrays(root: zarr.Group, store: Path, samples: Sequence[int] | None) -> lis
 
 
 @contextmanager
-def _new(file: Path) -> Iterator[Path]:
+def _new(file: Path, kind: str) -> Iterator[Path]:
     """Give a path to write to, that becomes ``file`` when all is written."""
-    if file.exists():
-        raise OutputError(f"{file} exists; move it away or choose another name")
-    part = file.with_name(f".{file.name}.{os.getpid()}.part")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        yield part
-        part.rename(file)
-    except OSError as error:
-        raise OutputError(
-            f"cannot write {file}: {error.strerror or error}; choose another place"
-        ) from error
-    finally:
-        part.unlink(missing_ok=True)
+    with new_file(file) as part:
+        try:
+            yield part
+        except (MeasurementError, OutputError):
+            raise
+        except OSError as error:
+            if error.errno is not None and error.errno > 0:
+                raise
+            raise _unfit(file, kind, error) from error  # the library's own number, below 0
+        except (ValueError, TypeError, RuntimeError, OverflowError, KeyError) as error:
+            # What a name, a type or a shape of a foreign store is to the library that writes it.
+            raise _unfit(file, kind, error) from error
+
+
+def _unfit(file: Path, kind: str, error: Exception) -> OutputError:
+    return OutputError(
+        f"{file}: {kind} cannot hold what is in the store ({shortened(str(error))}); export to "
+        "the other format, or rename or leave out what it names"
+    )
 
 
 def _attributes(attributes: dict[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ The store does not depend on who made which sample, in what order, or in how man
 stores of one configuration are equal byte for byte.
 """
 
+import os
 import resource
 import sys
 import time
@@ -244,17 +245,19 @@ def _grow(
     job: DatasetJob, growing: GrowingDataset, workers: Workers, retry_failed: bool, tell: Tally
 ) -> int:
     """Make what is missing; return how many samples that were."""
-    finished = job.target.exists()
-    if finished:
+    if os.path.lexists(job.target):
         _refuse_foreign(job, growing.layout)
-        if not retry_failed or not any(True for _ in failed_samples(job.target)):
-            if growing.folder.exists():  # left by a retry that had hardly begun
-                with growing.locked():
-                    growing.discard()
-            return 0
+        again = retry_failed and any(True for _ in failed_samples(job.target))
+        if not again and not growing.folder.exists():
+            return 0  # where nothing may be written, too
     with growing.locked():
+        # Looked at once nobody else makes it any more.
+        finished = os.path.lexists(job.target)
         if finished:
-            growing.reopen()
+            _refuse_foreign(job, growing.layout)
+            if not retry_failed or not growing.reopen():
+                growing.discard()  # left by a retry that had hardly begun
+                return 0
         growing.begin()
         if retry_failed and not finished:
             growing.forget_failed()

@@ -12,11 +12,10 @@ Every file is written under another name, flushed to the disk and renamed. A sam
 ``samples/N.npz`` or its block is there; ``store`` becomes ``FILE.zarr`` in one step at the end.
 """
 
-import fcntl
 import json
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,8 @@ import numpy as np
 import zarr
 from zarr.codecs import BloscCodec
 
+from estimator.measurement.atomic_rename import rename_new
+from estimator.measurement.file_lock import file_lock
 from simulator.dataset.config import differences
 from simulator.dataset.layout import LABEL_SAMPLES, Layout
 from simulator.dataset.sample import Row
@@ -32,6 +33,10 @@ from simulator.dataset.variables import FAILED, TEXT, Variable
 
 JOB = "dataset.json"
 IDENTITY = ("config", "base", "versions", "code")
+
+
+OURS = frozenset({JOB, f"{JOB}.part", "store", "store.part", "samples", "blocks", "lock"})
+"""All that may lie in the folder, at whatever moment the process was killed."""
 
 
 class DatasetError(ValueError):
@@ -57,27 +62,15 @@ class GrowingDataset:
         DatasetError
             If something else lies there, or a dataset of another configuration or version.
         """
-        if self.folder.exists() and (self.folder / JOB).is_file() and self.store.exists():
+        if (self.folder / JOB).is_file() and self.store.exists():
             self._refuse_another(json.loads((self.folder / JOB).read_text(encoding="utf-8")))
             self._clear_torn()
             return
-        if self.folder.exists():
-            ours = {JOB, "store", "samples", "blocks", "lock"}
-            foreign = {one.name for one in self.folder.iterdir()} - ours
-            if foreign:
-                raise DatasetError(
-                    f"{self.folder} holds what mmslam did not write ({sorted(foreign)[0]}); move "
-                    "it away or choose another file"
-                )
-            for name in (JOB, "store", "samples", "blocks"):  # begun, and not ended
-                _remove(self.folder / name)
-        for name in ("samples", "blocks"):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        self._start_anew()
         making = self.folder / "store.part"
-        _remove(making)
         create_store(making, self.layout)
         self._write_job()
-        making.rename(self.store)
+        making.rename(self.store)  # last: until then, whoever comes starts anew
 
     def reopen(self) -> tuple[int, ...]:
         """Turn the finished dataset into an unfinished one that lacks its failed samples.
@@ -89,10 +82,7 @@ class GrowingDataset:
         failed = tuple(failed_samples(self.target))
         if not failed:
             return ()
-        for name in (JOB, "store", "samples", "blocks"):
-            _remove(self.folder / name)
-        for name in ("samples", "blocks"):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        self._start_anew()
         again = {sample // self.layout.block for sample in failed}
         for block in range(self.layout.blocks):
             samples = self.layout.block_samples(block)
@@ -107,8 +97,9 @@ class GrowingDataset:
         return failed
 
     def discard(self) -> None:
-        """Remove the folder: the dataset itself is whole."""
-        _remove(self.folder)
+        """Remove the folder, but for the lock: the dataset itself is whole."""
+        for name in OURS - {"lock"}:
+            _remove(self.folder / name)
 
     def forget_failed(self) -> None:
         """Have the failed samples of the unfinished dataset made again."""
@@ -134,16 +125,21 @@ class GrowingDataset:
         DatasetError
             If another process holds it.
         """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / "lock").open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+        with file_lock(self.folder / "lock") as held:
+            if not held:
                 raise DatasetError(
                     f"{self.target} is being made by another process; wait for it, or choose "
                     "another file"
-                ) from None
-            yield
+                )
+            try:
+                yield
+            finally:
+                if {one.name for one in self.folder.iterdir()} <= {"lock"}:
+                    # All is done, or nothing was begun. The lock last: whoever comes now must
+                    # not find anything of ours.
+                    (self.folder / "lock").unlink(missing_ok=True)
+                    with suppress(OSError):
+                        self.folder.rmdir()
 
     # What is done
 
@@ -215,8 +211,9 @@ class GrowingDataset:
                 array[start : start + len(values)] = _as_stored(variable, values)
         for variable in small:
             flush(self.store / variable.key)
-        self.store.rename(self.target)
-        _remove(self.folder)
+        self._clear_partial()  # of workers that were killed on the way
+        rename_new(self.store, self.target)
+        self.discard()
 
     # Its own files
 
@@ -251,6 +248,18 @@ class GrowingDataset:
                 "that, or remove the folder, or choose another file"
             )
 
+    def _start_anew(self) -> None:
+        """Remove what was begun before there was a store, or is held by the finished one."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if foreign := sorted({one.name for one in self.folder.iterdir()} - OURS):
+            raise DatasetError(
+                f"{self.folder} holds what mmslam did not write ({foreign[0]}); move it away or "
+                "choose another file"
+            )
+        self.discard()
+        for name in ("samples", "blocks"):
+            (self.folder / name).mkdir()
+
     def _clear_torn(self) -> None:
         """Remove what a process left behind that ended in the middle of something."""
         for folder in (self.folder, self.folder / "samples", self.folder / "blocks"):
@@ -258,6 +267,9 @@ class GrowingDataset:
             for entry in folder.iterdir():
                 if ".part" in entry.suffixes or entry.name.endswith(".part"):
                     _remove(entry)
+        self._clear_partial()
+
+    def _clear_partial(self) -> None:
         for partial in self.store.rglob("*.partial"):
             partial.unlink()
         collected = set(self.collected())

@@ -5,13 +5,13 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import textwrap
 import time
 from pathlib import Path
 
 import pytest
 
+from estimator.measurement import atomic_rename, file_lock
 from mmslam import output
 from mmslam.output import OutputError, refuse_foreign_results, refuse_foreign_store, replacing
 
@@ -71,14 +71,14 @@ def test_an_interruption_between_the_two_renames_puts_the_old_folder_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fill(tmp_path / "out", "old")
-    rename = Path.rename
 
-    def interrupted(self: Path, target: Path) -> Path:
-        if self.name == "new":
+    def interrupted(source: Path, target: Path) -> None:
+        if source.name.startswith("whole-") and not target.exists():
             raise KeyboardInterrupt
-        return rename(self, target)
+        atomic_rename.rename_new(source, target)
 
-    monkeypatch.setattr(Path, "rename", interrupted)
+    monkeypatch.setattr(output, "exchange", lambda one, other: False)  # as on other systems
+    monkeypatch.setattr(output, "rename_new", interrupted)
     with (
         pytest.raises(KeyboardInterrupt),
         replacing(tmp_path / "out", refuse_foreign_results) as new,
@@ -164,10 +164,10 @@ def test_a_link_is_followed_and_kept(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_found_out_before_any_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
-    def refused(**_: object) -> str:
+    def refused(*_: object) -> int:
         raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(tempfile, "mkdtemp", refused)
+    monkeypatch.setattr(file_lock, "_taken", refused)
     with (
         pytest.raises(OutputError, match="cannot write"),
         replacing(tmp_path / "a" / "out", refuse_foreign_results),
@@ -264,3 +264,107 @@ def test_ctrl_c_in_the_middle_of_a_write_leaves_nothing_half_written(tmp_path: P
     _, errors = child.communicate(timeout=30)
     assert "nothing was written" in errors
     assert everything_below(tmp_path) == []
+
+
+@pytest.fixture(params=["in one step", "by two renames"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Exchange names as this system can, and as others have to."""
+    if request.param == "by two renames":
+        monkeypatch.setattr(atomic_rename, "_renameat2", lambda *_: False)
+    return str(request.param)
+
+
+def test_notes_added_while_the_command_works_are_not_deleted(tmp_path: Path, way: str) -> None:
+    def work() -> None:
+        with replacing(tmp_path / "out", refuse_foreign_results) as new:
+            fill(new)
+            (tmp_path / "out" / "notes.txt").write_text("mine")
+
+    fill(tmp_path / "out", "old")
+    with pytest.raises(OutputError, match=r"out was changed.*notes\.txt.*out-new1"):
+        work()
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert (tmp_path / "out-new1" / output.REPORT).read_text() == "new"  # hours of work, maybe
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "out-new1"]
+
+
+def test_a_folder_made_while_the_command_works_is_not_deleted(tmp_path: Path, way: str) -> None:
+    def work() -> None:
+        with replacing(tmp_path / "out", refuse_foreign_results) as new:
+            fill(new)
+            (tmp_path / "out").mkdir()
+            (tmp_path / "out" / "thesis.tex").write_text("years of work")
+
+    with pytest.raises(OutputError, match="out was changed"):
+        work()
+    assert (tmp_path / "out" / "thesis.tex").read_text() == "years of work"
+
+
+def test_what_is_changed_in_the_last_instant_is_put_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Between the look at what is replaced and the exchange, which is one step.
+    def late(one: Path, other: Path) -> bool:
+        if other.name == "out" and not (other / "notes.txt").exists():
+            (other / "notes.txt").write_text("mine")
+        return atomic_rename.exchange(one, other)
+
+    def work() -> None:
+        with replacing(tmp_path / "out", refuse_foreign_results) as new:
+            fill(new)
+
+    fill(tmp_path / "out", "old")
+    monkeypatch.setattr(output, "exchange", late)
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        work()
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+
+
+def test_two_commands_on_one_output_do_not_work_at_once(tmp_path: Path) -> None:
+    with replacing(tmp_path / "out", refuse_foreign_results) as new:
+        fill(new)
+        with (
+            pytest.raises(OutputError, match="out is being written by another mmslam command"),
+            replacing(tmp_path / "out", refuse_foreign_results),
+        ):
+            pytest.fail("the block must not be entered")
+    assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
+
+
+def test_a_file_is_never_replaced_not_even_one_made_meanwhile(tmp_path: Path, way: str) -> None:
+    def work() -> None:
+        with output.new_file(tmp_path / "it.nc") as new:
+            new.write_text("new")
+            (tmp_path / "it.nc").write_text("mine")
+
+    with pytest.raises(OutputError, match=r"it\.nc was changed.*it-new1\.nc"):
+        work()
+    assert (tmp_path / "it.nc").read_text() == "mine"
+    assert (tmp_path / "it-new1.nc").read_text() == "new"
+    with pytest.raises(OutputError, match="exists"), output.new_file(tmp_path / "it.nc"):
+        pytest.fail("the block must not be entered")
+
+
+def test_a_link_in_the_place_of_our_own_folder_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "precious").mkdir()
+    (tmp_path / "precious" / "new").write_text("mine")
+    (tmp_path / ".out.mmslam").symlink_to(tmp_path / "precious")
+    with (
+        pytest.raises(OutputError, match="is a link"),
+        replacing(tmp_path / "out", refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")
+    assert (tmp_path / "precious" / "new").read_text() == "mine"
+
+
+def test_a_name_as_long_as_the_file_system_takes_is_taken(tmp_path: Path) -> None:
+    with replacing(tmp_path / ("o" * 255), refuse_foreign_results) as new:
+        fill(new)
+    assert [len(path.name) for path in tmp_path.iterdir()] == [255]
+    with (
+        pytest.raises(OutputError, match="the name is too long"),
+        replacing(tmp_path / ("o" * 256), refuse_foreign_results),
+    ):
+        pytest.fail("the block must not be entered")

@@ -8,7 +8,9 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
+from estimator.measurement.guarded_store import damage_told, opened_store
 from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import TRUTH
 
 Points = dict[str, Float[np.ndarray, " 3"]]
 
@@ -104,7 +106,9 @@ def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
 
 def read_truth(path: Path, *, sample: int | None = None) -> Truth:
     """Read where things really are from a measurement store, as :func:`read_truth_dataset` does."""
-    return truth_from_dataset(read_truth_dataset(path, sample=sample))
+    found = read_truth_dataset(path, sample=sample)
+    with damage_told(Path(path) / TRUTH):  # values of a kind that no truth has
+        return truth_from_dataset(found)
 
 
 def read_truth_dataset(path: Path, *, sample: int | None = None) -> xr.Dataset | None:
@@ -126,18 +130,21 @@ def read_truth_dataset(path: Path, *, sample: int | None = None) -> xr.Dataset |
     MeasurementError
         If there is such a group, but it cannot be read.
     """
-    group = Path(path) / "truth"
+    group = Path(path) / TRUTH
     if not group.exists():
         return None
     try:
-        with xr.open_zarr(path, group="truth", consolidated=False, chunks=None) as lazy:
+        store = opened_store(Path(path))
+        with (
+            damage_told(group),
+            xr.open_zarr(store, group=TRUTH, consolidated=False, chunks=None) as lazy,
+        ):
             chosen = lazy.isel(sample=sample or 0) if "sample" in lazy.dims else lazy
             dataset: xr.Dataset = chosen.load()
             return dataset
-    except Exception as error:  # Zarr, codecs and JSON fail in many ways on a damaged store
+    except MeasurementError as error:
         raise MeasurementError(
-            f"{group}: the truth cannot be read ({type(error).__name__}: {error}); delete that "
-            "folder to go on without a comparison, or write the store again"
+            f"the truth cannot be read: {error}; or delete {group} to go on without a comparison"
         ) from error
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from estimator.measurement import store as store_module
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.measurement.store import (
     is_store,
@@ -412,8 +413,9 @@ def test_a_write_that_fails_leaves_what_was_there_and_nothing_else(
     assert_same(read_measurement(store), measurement)
 
 
+@pytest.mark.parametrize("in_one_step", [True, False])
 def test_the_old_store_survives_if_the_new_one_cannot_take_its_place(
-    measurement: Measurement, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    measurement: Measurement, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_one_step: bool
 ) -> None:
     store = tmp_path / "a.zarr"
     write_measurement(store, measurement)
@@ -424,7 +426,14 @@ def test_the_old_store_survives_if_the_new_one_cannot_take_its_place(
             raise OSError(13, "Permission denied")
         return really_rename(path, target)
 
-    monkeypatch.setattr(Path, "rename", refuse_the_new_one)
+    def refuse(*_: object) -> bool:
+        raise OSError(13, "Permission denied")
+
+    if in_one_step:
+        monkeypatch.setattr(store_module, "exchange", refuse)
+    else:  # as where a system exchanges no names
+        monkeypatch.setattr(store_module, "exchange", lambda one, other: False)
+        monkeypatch.setattr(Path, "rename", refuse_the_new_one)
     with pytest.raises(OSError, match="Permission denied"):
         write_measurement(store, replace(measurement, seed=1))
     monkeypatch.undo()
