@@ -12,6 +12,7 @@ from estimator.results.estimate import Progress
 from mmslam import output
 from mmslam.measurement import Measurement
 from mmslam.measurement_files import read, write
+from mmslam.plain_text import file_name
 from mmslam.results.document import result_document, to_json
 from mmslam.results.estimate import Estimate
 from mmslam.terminal.interruption import interruptions_held
@@ -201,7 +202,7 @@ def locate_measurement(
 
 def default_folder(measurement: Measurement, path: Path, sample: int | None) -> Path:
     """Name the folder for the estimate of a file: never the one of the run that wrote it."""
-    parts = [measurement.scenario or path.stem]
+    parts = [file_name(measurement.scenario or path.stem)]
     if measurement.seed is not None:
         parts.append(str(measurement.seed))
     if sample is not None:

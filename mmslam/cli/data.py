@@ -7,6 +7,7 @@ import typer
 
 from mmslam.cli.options import AsJson, OutFile
 from mmslam.cli.printing import print_json, print_written
+from mmslam.plain_text import message, visible
 from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
 
 
@@ -66,7 +67,7 @@ def import_(
         with stdout_kept_clean():
             measurement = import_to_file(source, mapping=mapping, uplink=uplink, path=output)
         for note in measurement.notes:
-            typer.echo(f"mmslam: note: {note}", err=True)
+            typer.echo(message(f"mmslam: note: {note}"), err=True)
         print_written(output, measurement, as_json)
 
 
@@ -126,4 +127,4 @@ def export(
         if as_json:
             print_json(told)
         else:
-            typer.echo(line)
+            typer.echo(visible(line))

@@ -1,16 +1,17 @@
 """What commands print on stdout."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from mmslam.plain_text import json_text, visible
+
 
 def print_json(document: Mapping[str, Any]) -> None:
     """Print one JSON document."""
-    typer.echo(json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False))
+    typer.echo(json_text(document))
 
 
 def print_outcome(result: Mapping[str, Any], folder: Path, as_json: bool) -> None:
@@ -21,7 +22,7 @@ def print_outcome(result: Mapping[str, Any], folder: Path, as_json: bool) -> Non
     from mmslam.terminal.summary import summary_lines
 
     for line in summary_lines(result, folder):
-        typer.echo(line)
+        typer.echo(visible(line))
 
 
 def print_written(path: Path, measurement: Any, as_json: bool) -> None:
@@ -33,4 +34,4 @@ def print_written(path: Path, measurement: Any, as_json: bool) -> None:
         print_json({"file": str(path), **summary})
     else:
         told = [f"{key} {value}" for key, value in summary.items() if value is not None]
-        typer.echo(f"{path}: {', '.join(told)}")
+        typer.echo(visible(f"{path}: {', '.join(told)}"))

@@ -8,6 +8,7 @@ import typer
 import mmslam
 from mmslam.cli.options import AsJson, OutFile, OutFolder, Overrides, ScenarioName, Seed
 from mmslam.cli.printing import print_json, print_outcome, print_written
+from mmslam.plain_text import visible
 from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
 
 
@@ -182,7 +183,7 @@ def track(
             print_json(tracked.document)
             return
         for line in track_lines(tracked.document, tracked.folder):
-            typer.echo(line)
+            typer.echo(visible(line))
 
 
 def _picture(show: bool, out: Path | None, name: str) -> Path | None:

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from mmslam.output import OutputError
+from mmslam.plain_text import visible
 from mmslam.terminal.interruption import ResumableInterruption, interruptions_held
 from mmslam.terminal.task_progress import WorkProgress, told_size, told_time
 from simulator.dataset import builder
@@ -210,4 +211,4 @@ def _forecast_document(found: Forecast, target: Path, workers: int) -> dict[str,
 def print_lines(told: Iterator[str]) -> None:
     """Print lines on stdout."""
     for line in told:
-        typer.echo(line)
+        typer.echo(visible(line))

@@ -7,6 +7,7 @@ import typer
 
 from mmslam.library import load_scenario, scenarios
 from mmslam.output import OutputError
+from mmslam.plain_text import json_text, visible
 from mmslam.terminal.exit_codes import stdout_kept_clean
 from scenes.files.loading import scenario_to_toml
 from scenes.files.relocatable import relocatable
@@ -21,11 +22,11 @@ def list_scenarios(*, export: Path | None, as_json: bool) -> None:
             _export_toml(load_scenario(name), export)
     if as_json:
         listed = [{"name": name, "title": title} for name, title in titles.items()]
-        typer.echo(json.dumps(listed, indent=2, ensure_ascii=False))
+        typer.echo(json_text(listed))
         return
     width = max(map(len, titles), default=0)
     for name, title in titles.items():
-        typer.echo(f"{name:<{width}}  {title}")
+        typer.echo(visible(f"{name:<{width}}  {title}"))
 
 
 def show_scenario(
@@ -57,12 +58,12 @@ def show_scenario(
         document = json.loads(scenario.model_dump_json())  # infinity becomes null
         if written:
             document = {"files": [str(path) for path in written], "scenario": document}
-        typer.echo(json.dumps(document, indent=2, ensure_ascii=False))
+        typer.echo(json_text(document))
     elif written:
         for path in written:
-            typer.echo(path)
+            typer.echo(visible(str(path)))
     else:
-        typer.echo(scenario_to_toml(scenario).rstrip())
+        typer.echo(visible(scenario_to_toml(scenario).rstrip()))
 
 
 def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:

@@ -224,7 +224,7 @@ def _new(file: Path, kind: str) -> Iterator[Path]:
             if error.errno is not None and error.errno > 0:
                 raise
             raise _unfit(file, kind, error) from error  # the library's own number, below 0
-        except (ValueError, TypeError, RuntimeError, OverflowError, KeyError) as error:
+        except (ValueError, TypeError, RuntimeError, LookupError, AttributeError) as error:
             # What a name, a type or a shape of a foreign store is to the library that writes it.
             raise _unfit(file, kind, error) from error
 
@@ -241,7 +241,8 @@ def _attributes(attributes: dict[str, Any]) -> dict[str, Any]:
     return {
         key: value
         for key, value in attributes.items()
-        if isinstance(value, plain) and not isinstance(value, bool)
+        # What begins with an underscore is a library's own, such as xarray's _FillValue.
+        if isinstance(value, plain) and not isinstance(value, bool) and not key.startswith("_")
     }
 
 

@@ -4,7 +4,6 @@ A TOML file beside the data. Paths in it are relative to it. Every table is chec
 sample is read; see :class:`SweepMapping` for the keys.
 """
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,11 +12,9 @@ from pydantic import Field, ValidationError, model_validator
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.file_pattern import fields_of_pattern
-from scenes.schema.errors import problems
+from scenes.files.toml_reader import read_toml
+from scenes.schema.errors import ScenarioError, problems
 from scenes.schema.quantities import Checked
-
-LARGEST_FILE = 10 * 2**20
-"""Largest mapping file that is read [byte]."""
 
 POSITION, FREQUENCY, AXIS = "position", "frequency", "axis"
 GRID_AXES = ("x", "y", "z")
@@ -275,25 +272,15 @@ def load_mapping(path: Path) -> SweepMapping:
         If the file cannot be read, or a key is missing, unknown or impossible: a line for each.
     """
     try:
-        if path.is_file() and path.stat().st_size > LARGEST_FILE:
-            raise MeasurementError(
-                f"{path}: {path.stat().st_size} bytes are more than a mapping's {LARGEST_FILE}; "
-                "is it the data?"
-            )
-        data = tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise MeasurementError(
-            f"{path}: cannot be read ({error.strerror}); give a mapping file by --mapping, "
-            "its keys are listed by `mmslam import --schema`"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise MeasurementError(
-            f"{path}: not text in UTF-8 (byte {error.start}); a mapping is a TOML file"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise MeasurementError(f"{path}: not valid TOML: {error}; correct it there") from None
-    except RecursionError:
-        raise MeasurementError(f"{path}: nested too deeply; is it a mapping?") from None
+        data = read_toml(
+            path,
+            name=str(path),
+            kind="mapping",
+            remedy="give a mapping file by --mapping, its keys are listed by "
+            "`mmslam import --schema`",
+        )
+    except ScenarioError as error:
+        raise MeasurementError(str(error)) from None
     return checked_mapping(data, place=f"{path}: ")
 
 

@@ -1,6 +1,5 @@
 """The result as one JSON document: SI, null where unknown, the same bytes for the same run."""
 
-import json
 import math
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -13,6 +12,7 @@ from estimator.compute import engine
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
 from mmslam.output import FORMAT
+from mmslam.plain_text import json_text
 from validation.metrics.errors import WallError, position_error, wall_errors
 from validation.metrics.truth import Truth
 
@@ -92,7 +92,7 @@ def plain(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def to_json(document: Mapping[str, Any]) -> str:
     """Write a document as JSON text; NaN is refused, it must have become null before."""
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text(document) + "\n"
 
 
 def versions() -> dict[str, str | None]:

@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Measurement
+from mmslam.plain_text import visible
 from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Scenario
 
@@ -54,6 +55,7 @@ def render_report(
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_shown,
     )
     environment.filters["fixed"] = _fixed
     environment.filters["point"] = _point
@@ -92,6 +94,11 @@ def radio_parameters(measurement: Measurement) -> dict[str, str]:
         described["range resolution c/2B"] = f"{1e3 * speed_of_light / (2 * bandwidth):.2f} mm"
         described["unambiguous one-way path"] = f"{speed_of_light / step:.2f} m"
     return described
+
+
+def _shown(value: object) -> object:
+    """Show control characters and marks of direction of a name, rather than obey them."""
+    return visible(value) if type(value) is str else value  # markup is our own template's
 
 
 def _fixed(value: float | None, digits: int = 3, scale: float = 1.0) -> str:

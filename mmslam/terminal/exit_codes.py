@@ -1,17 +1,35 @@
 """Exit codes: bad input gives one message and 2, Ctrl-C gives 130; a bug keeps its traceback."""
 
 import contextlib
+import errno
 import os
 import sys
 from collections.abc import Iterator
 
 import typer
 
+from mmslam.plain_text import message
 from mmslam.terminal.interruption import ResumableInterruption, interruptions_noted
 
 FALLS_SHORT = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
+
+
+# What a file's name or place is to blame for, whoever came upon it; other errors are bugs.
+_OF_THE_PLACE = frozenset(
+    {
+        errno.EACCES,
+        errno.EDQUOT,
+        errno.EIO,
+        errno.ELOOP,
+        errno.ENAMETOOLONG,
+        errno.ENOSPC,
+        errno.EPERM,
+        errno.EROFS,
+        errno.ESTALE,
+    }
+)
 
 
 @contextlib.contextmanager
@@ -25,9 +43,12 @@ def told_clearly() -> Iterator[None]:
                 resumable = isinstance(error, ResumableInterruption)
                 _say(str(error) if resumable else "interrupted; nothing was written")
                 raise typer.Exit(INTERRUPTED) from None
-            if not isinstance(error, _users_errors()):
+            if isinstance(error, OSError) and error.errno in _OF_THE_PLACE:
+                _say(f"error: {error.filename or 'a file'}: {error.strerror}; choose another one")
+            elif isinstance(error, _users_errors()):
+                _say(f"error: {error}")
+            else:
                 raise
-            _say(f"error: {error}")
             raise typer.Exit(BAD_INPUT) from None
 
 
@@ -49,8 +70,8 @@ def stdout_kept_clean() -> Iterator[None]:
         os.close(kept)
 
 
-def _say(message: str) -> None:
-    typer.echo(f"mmslam: {message}", err=True)
+def _say(text: str) -> None:
+    typer.echo(message(f"mmslam: {text}"), err=True)
 
 
 def _users_errors() -> tuple[type[Exception], ...]:

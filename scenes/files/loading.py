@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from scenes.files.toml_reader import is_file, read_toml
 from scenes.files.toml_writer import toml_text
 from scenes.meshes.foreign_scene import Geometry
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
-from scenes.schema.errors import did_you_mean, shown
-
-LARGEST_FILE = 10 * 2**20
-"""Largest scenario file that is read [byte]."""
+from scenes.schema.errors import did_you_mean, shown, shown_text
 
 _BEGIN = {
     "objects": "kind",
@@ -118,7 +116,7 @@ def load_scenario(
     except ScenarioError as error:
         if str(error).startswith(("--set ", _OVERRIDE)):
             raise
-        lines = [f"{name_or_path}: {line}" for line in str(error).splitlines()]
+        lines = [f"{shown_text(name_or_path)}: {line}" for line in str(error).splitlines()]
         raise ScenarioError("\n".join(lines)) from None
 
 
@@ -138,10 +136,16 @@ def scenario_source(name_or_path: str) -> ScenarioSource:
         folder = source.parent
     else:
         raise ScenarioError(
-            f"scenario {name_or_path!r}: no such name{did_you_mean(name_or_path, scenario_names())}"
-            f"; known: {', '.join(scenario_names())}; or give the path of a TOML file"
+            f"scenario {shown_text(name_or_path)!r}: no such name"
+            f"{did_you_mean(name_or_path, scenario_names())}; known: "
+            f"{', '.join(scenario_names())}; or give the path of a TOML file"
         )
-    data = _tables(source, name_or_path)
+    data = read_toml(
+        source,
+        name=name_or_path,
+        kind="scenario",
+        remedy=f"give the path of a TOML file, or one of {', '.join(scenario_names())}",
+    )
     data.setdefault("name", source.name.removesuffix(".toml"))
     return ScenarioSource(origin=name_or_path, tables=data, folder=folder)
 
@@ -166,7 +170,7 @@ def set_keys(data: dict[str, Any], values: Mapping[str, object], *, by: str = "-
     """
     known = {group: set(_group(data, group)) for group in _BEGIN}
     for key, value in values.items():
-        _set(key, value, data, shown_as=f"{by}{key!r}")
+        _set(key, value, data, shown_as=f"{by}{shown_text(key)!r}")
     _refuse_new_names(data, known, by)
 
 
@@ -203,32 +207,7 @@ def _folder() -> Traversable:
 
 
 def _is_path(text: str) -> bool:
-    return text.endswith(".toml") or "/" in text or "\\" in text or Path(text).is_file()
-
-
-def _tables(source: Traversable, shown_name: str) -> dict[str, Any]:
-    try:
-        if isinstance(source, Path) and source.stat().st_size > LARGEST_FILE:
-            raise ScenarioError(
-                f"{shown_name}: {source.stat().st_size} bytes are more than a scenario's "
-                f"{LARGEST_FILE}; is it another file?"
-            )
-        text = source.read_bytes().decode()
-    except OSError as error:
-        raise ScenarioError(
-            f"{shown_name}: cannot be read ({error.strerror}); give the path of a TOML file, or "
-            f"one of {', '.join(scenario_names())}"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(
-            f"{shown_name}: not text in UTF-8 (byte {error.start}); is it a TOML file?"
-        ) from None
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{shown_name}: not valid TOML: {error}; correct it there") from None
-    except RecursionError:
-        raise ScenarioError(f"{shown_name}: nested too deeply; is it a scenario?") from None
+    return text.endswith(".toml") or "/" in text or "\\" in text or is_file(Path(text))
 
 
 def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
@@ -237,10 +216,10 @@ def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
         key, separator, text = override.partition("=")
         if not separator or not all(part.strip() for part in key.split(".")):
             raise ScenarioError(
-                f"--set {override!r}: must be KEY=VALUE with a dotted KEY, such as "
+                f"--set {shown_text(override)!r}: must be KEY=VALUE with a dotted KEY, such as "
                 "objects.wall.angle_deg=35"
             )
-        _set(key, _literal(text.strip()), data, shown_as=f"--set {override!r}")
+        _set(key, _literal(text.strip()), data, shown_as=f"--set {shown_text(override)!r}")
     _refuse_new_names(data, known, "--set ")
 
 
@@ -256,9 +235,10 @@ def _refuse_new_names(data: dict[str, Any], known: Mapping[str, set[str]], by: s
         for name, table in _group(data, group).items():
             if name not in known[group] and isinstance(table, dict) and needed not in table:
                 raise ScenarioError(
-                    f"{by}{group}.{name}: no such name{did_you_mean(name, known[group])}; known: "
+                    f"{by}{group}.{shown_text(name)}: no such name"
+                    f"{did_you_mean(name, known[group])}; known: "
                     f"{', '.join(sorted(known[group])) or 'none'}; to add one, set "
-                    f"{group}.{name}.{needed} as well"
+                    f"{group}.{shown_text(name)}.{needed} as well"
                 )
 
 
@@ -273,7 +253,7 @@ def _set(key: str, value: object, data: dict[str, Any], *, shown_as: str) -> Non
     for depth, part in enumerate(path[:-1]):
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            parent = ".".join(path[: depth + 1])
+            parent = shown_text(".".join(path[: depth + 1]))
             raise ScenarioError(
                 f"{shown_as}: {parent} = {shown(table)} is a value, not a table; set "
                 f"{parent} itself"
@@ -285,7 +265,7 @@ def _literal(text: str) -> object:
     """Read a TOML literal; what is none is a string."""
     try:
         values = tomllib.loads(f"value = {text}")
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # a ValueError: more digits than Python reads
         return text
     return values["value"] if list(values) == ["value"] else text
 
@@ -294,7 +274,7 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
     """Make paths relative to the scenario's file absolute: scenes, meshes, permittivities."""
     geometry = data.get("geometry")
     if isinstance(geometry, dict) and isinstance(geometry.get("file"), str) and geometry["file"]:
-        geometry["file"] = str((folder / geometry["file"]).resolve())
+        geometry["file"] = _absolute(folder, geometry["file"])
     bodies = list(_group(data, "objects").values())
     for group in ("materials", "objects"):
         bodies += _group(geometry if isinstance(geometry, dict) else {}, group).values()
@@ -307,7 +287,14 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
                 continue
             for key in ("file", "realisation"):
                 if isinstance(table.get(key), str) and table[key]:
-                    table[key] = str((folder / table[key]).resolve())
+                    table[key] = _absolute(folder, table[key])
+
+
+def _absolute(folder: Path, name: str) -> str:
+    try:
+        return str((folder / name).resolve())
+    except (OSError, RuntimeError, ValueError):  # no file can be called so, or links in a circle
+        return str(folder / name)  # whoever opens it says so
 
 
 def _is_position(value: Any) -> bool:

@@ -40,9 +40,10 @@ def placed_mesh(body: MeshFile) -> TriangleMesh:
         )
     try:
         status = path.stat()
-    except OSError as error:
+    except (OSError, ValueError) as error:
+        told = error.strerror if isinstance(error, OSError) else error
         raise ScenarioError(
-            f"mesh file {body.file!r}: {error.strerror}; give the path of a mesh, relative to "
+            f"mesh file {body.file!r}: {told}; give the path of a mesh, relative to "
             "the scenario's file"
         ) from None
     if not path.is_file() or not 0 < status.st_size <= LARGEST_FILE:

@@ -15,7 +15,7 @@ from xml.parsers import expat
 import numpy as np
 from jaxtyping import Float
 
-from scenes.schema.errors import ScenarioError, did_you_mean
+from scenes.schema.errors import ScenarioError, did_you_mean, shown_text
 from scenes.schema.quantities import FORBIDDEN_IN_NAMES
 
 LARGEST_FILE = 10 * 2**20
@@ -117,7 +117,7 @@ def read_mitsuba_xml(path: Path) -> tuple[ForeignShape, ...]:
 
 
 def _refusal(path: Path, reason: str) -> ScenarioError:
-    return ScenarioError(f"scene file {str(path)!r}: {reason}")
+    return ScenarioError(f"scene file {shown_text(str(path))!r}: {reason}")
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -128,8 +128,11 @@ def _parsed(path: Path) -> ElementTree.Element:
                 path, f"a file of 1 to {LARGEST_FILE} bytes is needed, this has {size}; is it XML?"
             )
         text = path.read_bytes()
-    except OSError as error:
-        raise _refusal(path, f"{error.strerror}; give the path of a Mitsuba XML file") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, ScenarioError):
+            raise
+        told = error.strerror if isinstance(error, OSError) else error
+        raise _refusal(path, f"{told}; give the path of a Mitsuba XML file") from None
     builder = ElementTree.TreeBuilder()
     parser = expat.ParserCreate()
     depth = 0
@@ -157,8 +160,11 @@ def _parsed(path: Path) -> ElementTree.Element:
     parser.StartDoctypeDeclHandler = document_type
     try:
         parser.Parse(text, True)
-    except expat.ExpatError as error:
-        raise _refusal(path, f"not valid XML: {error}; export it again") from None
+    # Of an encoding that it does not know, expat says so by other exceptions.
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        if isinstance(error, ScenarioError):
+            raise
+        raise _refusal(path, f"not valid XML: {shown_text(str(error))}; export it again") from None
     root: ElementTree.Element = builder.close()
     return root
 
@@ -245,7 +251,10 @@ def _mesh_file(path: Path, name: str) -> Path:
     folder = path.resolve().parent
     if Path(name).suffix.lower().removeprefix(".") not in SHAPES:
         raise _refusal(path, f"mesh {name!r}: only PLY and OBJ files are read; export it as PLY")
-    file = (folder / name).resolve()  # links followed, so that none leads out
+    try:
+        file = (folder / name).resolve()  # links followed, so that none leads out
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _refusal(path, f"mesh {shown_text(name)!r}: {error}; rename it") from None
     if not file.is_relative_to(folder):
         raise _refusal(path, f"mesh {name!r} lies outside of the file's own folder; copy it there")
     return file

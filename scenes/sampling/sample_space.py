@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from scenes.files.loading import ScenarioSource, scenario_names, scenario_source, set_keys
+from scenes.files.toml_reader import is_file
 from scenes.meshes.foreign_scene import with_geometry
 from scenes.random_streams import random_stream
 from scenes.sampling.distributions import Drawn, Grid, Listed, Stepped
@@ -134,8 +135,8 @@ class SampleSpace:
                 lines = _problems_of_keys(self.tables({**some, key: value}))
                 mine = tuple(f"{key}{sign}" for sign in (" =", ":", "."))
                 found += [f"vary.{line}" for line in lines if line.startswith(mine)]
+        lines = _problems_of_keys(self.tables(some)) if self.variations.set else []
         for key in self.variations.set:
-            lines = _problems_of_keys(self.tables(some))
             mine = tuple(f"{key}{sign}" for sign in (" =", ":", "."))
             found += [f"set.{line}" for line in lines if line.startswith(mine)]
         if found:
@@ -350,7 +351,7 @@ def open_sample_space(variations: Variations, folder: Path) -> SampleSpace:
         If there is no such scenario.
     """
     base = variations.base
-    if base not in scenario_names() and (folder / base).is_file():
+    if base not in scenario_names() and is_file(folder / base):
         base = str(folder / base)
     try:
         return SampleSpace(scenario_source(base), variations)

@@ -4,7 +4,6 @@ The tables of a dataset's or a sweep's TOML file, typed and checked. Keys are do
 ``mmslam run --set``; here they may also be nested tables.
 """
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -12,13 +11,16 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from scenes.files.loading import LARGEST_FILE
+from scenes.files.toml_reader import read_toml
 from scenes.sampling.distributions import Distribution, Drawn
 from scenes.schema.errors import ScenarioError, problems
 from scenes.schema.quantities import Checked, Name
 
 MOST_SAMPLES = 100_000_000
 """Most samples of a dataset."""
+
+MOST_ATTEMPTS = 10_000
+"""Most draws of one sample: rarer than one in so many, what varies is to be narrowed."""
 
 MOST_COPIES = 1000
 """Most copies of one template."""
@@ -115,7 +117,10 @@ class Variations(Checked):
     )
     seed: int = Field(0, ge=0, le=2**63 - 1, description="the seed of all that is drawn")
     attempts: int = Field(
-        100, ge=1, le=100_000, description="how often a sample may be drawn until it is possible"
+        100,
+        ge=1,
+        le=MOST_ATTEMPTS,
+        description="how often a sample may be drawn until it is possible",
     )
     set: Settings = Field(default_factory=dict, description="keys that are the same in all samples")
     vary: Keys = Field(default_factory=dict, description="distributions by dotted key")
@@ -206,25 +211,12 @@ def load_variations(config: Path | Mapping[str, Any], model: type[_T]) -> _T:
 
 
 def _tables(path: Path) -> dict[str, Any]:
-    try:
-        if path.is_file() and path.stat().st_size > LARGEST_FILE:
-            raise ScenarioError(
-                f"{path}: {path.stat().st_size} bytes are more than a configuration's "
-                f"{LARGEST_FILE}; is it another file?"
-            )
-        return tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise ScenarioError(
-            f"{path}: cannot be read ({error.strerror}); give the TOML file that says what varies"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(
-            f"{path}: not text in UTF-8 (byte {error.start}); is it a TOML file?"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{path}: not valid TOML: {error}; correct it there") from None
-    except RecursionError:
-        raise ScenarioError(f"{path}: nested too deeply; is it a configuration?") from None
+    return read_toml(
+        path,
+        name=str(path),
+        kind="configuration",
+        remedy="give the TOML file that says what varies",
+    )
 
 
 def _checked(tables: Mapping[str, Any], model: type[_T], place: str) -> _T:

@@ -12,6 +12,8 @@ from pydantic.fields import FieldInfo
 NAME_TAG, TABLE_TAG = "[name]", "[table]"
 """Mark in pydantic's locations whether a name or a table was read; no key of a scenario's."""
 
+_LONGEST_TEXT = 200  # of what a message repeats, in characters
+
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxdict = _SHORT.maxlist = _SHORT.maxtuple = 4
@@ -23,6 +25,8 @@ class ScenarioError(ValueError):
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     """Suggest the closest known word: ``" (did you mean 'wall'?)"``, or nothing."""
+    if len(wrong) > _LONGEST_TEXT:  # comparing takes the square of it
+        return ""
     close = difflib.get_close_matches(wrong, list(known), n=1, cutoff=0.6)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
@@ -33,7 +37,15 @@ def shown(value: object) -> str:
         return str(value).lower()
     if isinstance(value, tuple):
         value = list(value)
-    return _SHORT.repr(value)
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # a whole number of more digits than Python writes
+        return "a number of thousands of digits"
+
+
+def shown_text(text: str) -> str:
+    """Show a name or another text from elsewhere in an error message, shortened."""
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}…"
 
 
 def problems(
@@ -73,7 +85,7 @@ class _Place:
 
 
 def _line(place: _Place, kind: str, message: str, context: dict[str, Any], value: object) -> str:
-    key = ".".join(place.path)
+    key = shown_text(".".join(map(shown_text, place.path)))
     remedy = (place.field.description if place.field else None) or ""
     kinds = [tag for choice in place.choices for tag in _tags(choice)]
     match kind:
@@ -88,7 +100,7 @@ def _line(place: _Place, kind: str, message: str, context: dict[str, Any], value
         case "union_tag_not_found":
             return f"{key}.kind: missing; give one of {', '.join(kinds)}"
         case "union_tag_invalid":
-            tag = str(context["tag"])
+            tag = shown_text(str(context["tag"]))
             return (
                 f"{key}.kind = {tag!r}: unknown kind{did_you_mean(tag, kinds)}; "
                 f"use one of {', '.join(kinds)}"

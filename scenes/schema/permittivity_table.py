@@ -35,6 +35,9 @@ def read_permittivity_table(path: Path) -> PermittivityTable:
         a passive material over frequency.
     """
     try:
+        if not path.is_file():
+            path.stat()  # says so if there is nothing
+            raise ScenarioError(f"{path}: not a file; give the path of a CSV table")
         if path.stat().st_size > LARGEST_FILE:
             raise ScenarioError(
                 f"{path}: {path.stat().st_size} bytes are more than a table's {LARGEST_FILE}; "
@@ -42,7 +45,9 @@ def read_permittivity_table(path: Path) -> PermittivityTable:
             )
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = _rows(path, file)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
+        if isinstance(error, ScenarioError):
+            raise
         raise ScenarioError(
             f"{path}: cannot be read as a CSV table ({error}); give the path of one that begins "
             f"with the line {','.join(COLUMNS)}"

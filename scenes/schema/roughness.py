@@ -22,13 +22,18 @@ leave a body. [-]"""
 SAME = 0.01
 """Difference of a given rms height or correlation length from the file's that is none. [-]"""
 
+SHORTEST_MM = 1e-6
+"""Shortest length that a surface has any heights over: a nanometre, some ten atoms. [mm]"""
+
 
 class Scale(Checked):
     """Statistics of heights with one correlation length."""
 
     rms_mm: float = Field(ge=0, le=1000, description="the rms height [mm]")
     correlation_mm: float = Field(
-        gt=0, le=1e6, description="the length at which the correlation has fallen to 1/e [mm]"
+        ge=SHORTEST_MM,
+        le=1e6,
+        description="the length at which the correlation has fallen to 1/e [mm]",
     )
     spectrum: Spectrum = Field("gaussian", description="'gaussian', 'exponential' or 'power_law'")
     hurst_exponent: float | None = Field(
@@ -40,7 +45,7 @@ class Scale(Checked):
     )
     inner_cutoff_mm: float | None = Field(
         None,
-        gt=0,
+        ge=SHORTEST_MM,
         description="the length below which an exponential surface, or one of a power law, is "
         "smooth [mm]",
     )

@@ -20,6 +20,9 @@ PATIENCE = 60.0
 CONNECTING = 10.0
 """How long a scheduler may take to answer. [s]"""
 
+STARTING = "1 hour"
+"""How long a worker of this machine that has died may take to start again: it may be busy."""
+
 DEATHS = 5
 """How many workers may die over one task before it counts as failed."""
 
@@ -164,6 +167,11 @@ def _client(workers: Workers) -> Iterator[Any]:
         "distributed.worker.memory.pause": False,
         "distributed.admin.log-length": 100,
         "distributed.admin.low-level-log-length": 100,
+        # Else a worker that needs longer to start again is given up, until there is none.
+        "distributed.deploy.lost-worker-timeout": STARTING,
+        # Nothing is told to whoever asks the ports that cannot be left closed.
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
     }
     with dask.config.set(settings):
         if workers.scheduler is not None:
@@ -175,6 +183,10 @@ def _client(workers: Workers) -> Iterator[Any]:
                 n_workers=workers.processes,
                 threads_per_worker=1,
                 processes=True,
+                host="127.0.0.1",
+                # Who may submit a task runs code as us, and any user of this machine reaches the
+                # port: both ends must show a certificate that is made here and kept in memory.
+                security=distributed.Security.temporary(),
                 dashboard_address=None,
                 # Without a dashboard, too, it serves its health, else at a port that may be taken.
                 scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
@@ -193,7 +205,12 @@ def _connected(address: str) -> Iterator[Any]:
     except (OSError, TimeoutError, ValueError) as error:
         raise WorkError(
             f"--scheduler {address}: cannot be reached ({type(error).__name__}); give the address "
-            "that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
+            "that `dask scheduler` prints, such as tls://10.0.0.1:8786"
+        ) from error
+    except TypeError as error:  # what Dask says where a certificate is missing
+        raise WorkError(
+            f"--scheduler {address}: Dask has no certificate for it ({error}); name yours in "
+            "Dask's configuration, distributed.comm.tls, as docs/how_to/cluster.md says"
         ) from error
     with client:
         try:

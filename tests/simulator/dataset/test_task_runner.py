@@ -1,6 +1,8 @@
+import contextlib
 import importlib
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -127,4 +129,77 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
     workers = Workers(scheduler="tcp://127.0.0.1:9")  # the port 'discard': nobody listens
     task = Task(name="square-1", function=square, arguments=(1,))
     with pytest.raises(WorkError, match=r"--scheduler tcp://127\.0\.0\.1:9: cannot be reached"):
+        work_off([task], workers=workers, on_result=lambda task, result: [])
+
+
+def the_address() -> str:
+    distributed: Any = importlib.import_module("distributed")
+    return str(distributed.get_worker().scheduler.address)
+
+
+def listening(parent: int) -> dict[str, list[str]]:
+    """Return the addresses where a process and its children listen, as `ss -ltn` would."""
+    family = {parent}
+    entries = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    for entry in sorted(entries, key=lambda entry: int(entry.name)):
+        with contextlib.suppress(OSError):
+            above = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            if above in family:
+                family.add(int(entry.name))
+    inodes = set()
+    for process in family:
+        with contextlib.suppress(OSError):
+            for file in (Path("/proc") / str(process) / "fd").iterdir():
+                with contextlib.suppress(OSError):
+                    inodes.add(os.readlink(file).removeprefix("socket:[").removesuffix("]"))
+    found: dict[str, list[str]] = {"loopback": [], "elsewhere": []}
+    for table, loopback in (("tcp", "0100007F"), ("tcp6", "0" * 24 + "01000000")):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and fields[9] in inodes:  # LISTEN
+                host = fields[1].partition(":")[0]
+                found["loopback" if host == loopback else "elsewhere"].append(fields[1])
+    return found
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_nobody_else_can_use_our_workers() -> None:
+    distributed: Any = importlib.import_module("distributed")
+    refusals: list[str] = []
+    sockets: dict[str, list[str]] = {}
+
+    def on_result(task: Task, result: Result) -> Iterable[Task]:
+        address = str(result)
+        assert address.startswith("tls://127.0.0.1:")
+        sockets.update(listening(os.getpid()))
+        strangers = {
+            "without encryption": (address.replace("tls://", "tcp://"), None),
+            "without certificate": (address, None),
+            "with a certificate of its own": (address, distributed.Security.temporary()),
+        }
+        for name, (where, security) in strangers.items():
+            try:
+                distributed.Client(where, security=security, timeout=2, set_as_default=False)
+            except (OSError, TypeError, TimeoutError):
+                refusals.append(name)
+        return []
+
+    work_off(
+        [Task(name="address", function=the_address)],
+        workers=Workers(processes=1),
+        on_result=on_result,
+    )
+    assert refusals == [
+        "without encryption",
+        "without certificate",
+        "with a certificate of its own",
+    ]
+    assert len(sockets["loopback"]) >= 2  # of scheduler and worker: the test sees sockets at all
+    assert sockets["elsewhere"] == []
+
+
+def test_a_scheduler_that_wants_a_certificate_is_not_asked_without_one() -> None:
+    task = Task(name="square-1", function=square, arguments=(1,))
+    workers = Workers(scheduler="tls://127.0.0.1:9")
+    with pytest.raises(WorkError, match="Dask has no certificate for it"):
         work_off([task], workers=workers, on_result=lambda task, result: [])

@@ -1,0 +1,76 @@
+"""What comes from data, made harmless for terminals, pages and file names.
+
+A name in somebody's file may hold control characters, which make a terminal write files, move the
+cursor or change its title, and marks of writing direction, which show another text than is there
+(Unicode Technical Report 36). They are shown by their numbers instead.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from typing import Any
+
+LONGEST_WORD = 200
+"""Longest part of a message without a space: what repeats a hostile name is cut. [-]"""
+
+LONGEST_LINE = 2000
+"""Longest line of a message. [-]"""
+
+LONGEST_FILE_NAME = 100
+"""Of a name that data give, in bytes: something is put before or behind it."""
+
+
+def visible(text: str) -> str:
+    """Show what a terminal would obey, or not show, by its number; line ends and tabs stay."""
+    if text.isprintable():
+        return text
+    return "".join(sign if sign.isprintable() or sign in "\n\t" else _number(sign) for sign in text)
+
+
+def message(text: str) -> str:
+    """Make a message of text that may repeat anything: visible, and its words and lines cut."""
+    return "\n".join(_cut(line) for line in visible(text).split("\n"))
+
+
+def json_text(document: Mapping[str, Any] | list[Any]) -> str:
+    """Write JSON that a terminal may show: what is not printable is escaped, as JSON allows."""
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else json.dumps(sign)[1:-1] for sign in text
+    )
+
+
+def file_name(text: str) -> str:
+    """Make a name that data give a file's: no separator, nothing hidden, not too long."""
+    name = "".join(
+        sign if sign.isprintable() and sign not in _SEPARATORS else "_" for sign in text
+    ).strip(" .")
+    if len(os.fsencode(name)) > LONGEST_FILE_NAME:
+        digest = hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:8]
+        name = f"{name[: LONGEST_FILE_NAME // 4 - 9]}-{digest}"  # a sign has 4 bytes at most
+    return name or "unnamed"
+
+
+_SEPARATORS = '/\\:*?"<>|'  # on some system or other
+
+
+def _number(sign: str) -> str:
+    code = ord(sign)
+    return (
+        f"\\x{code:02x}"
+        if code < 0x100
+        else f"\\u{code:04x}"
+        if code < 0x10000
+        else f"\\U{code:08x}"
+    )
+
+
+def _cut(line: str) -> str:
+    words = [
+        word if len(word) <= LONGEST_WORD else f"{word[:LONGEST_WORD]}…" for word in line.split(" ")
+    ]
+    line = " ".join(words)
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}…"
