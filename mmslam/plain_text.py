@@ -54,6 +54,22 @@ def file_name(text: str) -> str:
     return name or "unnamed"
 
 
+def drawn_plainly(figure: Any) -> None:
+    """Have what data put into a figure drawn as it is: no formula between two dollar signs.
+
+    Numbers on the axes are formulas, too, but get their text only when the figure is drawn.
+
+    Parameters
+    ----------
+    figure
+        Of Matplotlib, before it is drawn; our own labels hold no formula.
+    """
+    for artist in figure.findobj(lambda one: hasattr(one, "set_parse_math")):
+        if "$" in artist.get_text():
+            artist.set_parse_math(False)
+        artist.set_text(visible(artist.get_text()))
+
+
 _SEPARATORS = '/\\:*?"<>|'  # on some system or other
 
 

@@ -4,6 +4,8 @@ import html as _html
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from mmslam.plain_text import visible
+
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
@@ -28,8 +30,9 @@ def text(tables: Iterable[Table]) -> str:
     for table in tables:
         if not table.rows and not table.title:
             continue
-        lines += [table.title] if table.title else []
-        body = [*([table.heads] if table.heads and table.rows else []), *table.rows]
+        lines += [visible(table.title)] if table.title else []
+        shown = [*([table.heads] if table.heads and table.rows else []), *table.rows]
+        body = [[visible(cell) for cell in row] for row in shown]
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         for row in body:
             cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
@@ -55,7 +58,7 @@ def html(tables: Iterable[Table], *, picture: str = "") -> str:
             continue
         parts.append("<table>")
         if table.title:
-            parts.append(f"<caption>{_html.escape(table.title)}</caption>")
+            parts.append(f"<caption>{_html.escape(visible(table.title))}</caption>")
         if table.heads and table.rows:
             parts.append(_row(table.heads, "th"))
         parts += [_row(row, "td") for row in table.rows]
@@ -65,6 +68,6 @@ def html(tables: Iterable[Table], *, picture: str = "") -> str:
 
 def _row(cells: Sequence[str], tag: str) -> str:
     inside = "".join(
-        f'<{tag} style="text-align:left">{_html.escape(cell)}</{tag}>' for cell in cells
+        f'<{tag} style="text-align:left">{_html.escape(visible(cell))}</{tag}>' for cell in cells
     )
     return f"<tr>{inside}</tr>"

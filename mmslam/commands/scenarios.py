@@ -6,8 +6,8 @@ from pathlib import Path
 import typer
 
 from mmslam.library import load_scenario, scenarios
-from mmslam.output import OutputError
-from mmslam.plain_text import json_text, visible
+from mmslam.output import OutputError, reserved
+from mmslam.plain_text import drawn_plainly, json_text, visible
 from mmslam.terminal.exit_codes import stdout_kept_clean
 from scenes.files.loading import scenario_to_toml
 from scenes.files.relocatable import relocatable
@@ -95,9 +95,9 @@ def _export_meshes(scenario: Scenario, folder: Path, seed: int) -> list[Path]:
 
 
 def _write_new(path: Path, content: bytes) -> None:
-    if path.exists() and path.read_bytes() != content:
+    if path.is_symlink() or (path.exists() and path.read_bytes() != content):
         raise OutputError(
-            f"{path} exists with other content; move it away or choose another folder"
+            f"{path} exists with other content, or is a link; move it away or choose another folder"
         )
     _write(path, content)
 
@@ -120,6 +120,7 @@ def _draw(scenario: Scenario, path: Path) -> Path:
     draw_view(figure.add_subplot(columns[1], projection="3d"), scenario, paths)
     figure.suptitle(scenario.title or scenario.name)
     drawn = io.BytesIO()
+    drawn_plainly(figure)
     figure.savefig(drawn, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
     _write(path, drawn.getvalue())
     return path
@@ -127,7 +128,8 @@ def _draw(scenario: Scenario, path: Path) -> Path:
 
 def _write(path: Path, content: bytes) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        with reserved(path) as aside:  # it is there whole, or as it was
+            (aside / "new").write_bytes(content)
+            (aside / "new").replace(path.resolve())
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}; choose another place") from error

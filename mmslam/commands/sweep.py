@@ -8,6 +8,7 @@ from typing import Any
 
 from estimator.measurement.store import is_store
 from mmslam import output
+from mmslam.plain_text import drawn_plainly
 from mmslam.results.sweeps import Sweep, told_bound
 from mmslam.terminal.interruption import ResumableInterruption, interruptions_held
 from mmslam.terminal.task_progress import WorkProgress, told_time
@@ -206,8 +207,10 @@ def _write_figures(folder: Path, config: SweepConfig, outcomes: Sequence[Outcome
     upper.set_xlabel("")
     draw_found(lower, outcomes, config)
     figure.suptitle(config.title)
+    drawn_plainly(figure)
     figure.savefig(folder / FIGURES[0], dpi=DOTS_PER_INCH, metadata={"Software": None})
     figure = Figure(figsize=(7.5, 5), layout="constrained")
     draw_distribution(figure.add_subplot(), outcomes, config)
     figure.suptitle(config.title)
+    drawn_plainly(figure)
     figure.savefig(folder / FIGURES[1], dpi=DOTS_PER_INCH, metadata={"Software": None})

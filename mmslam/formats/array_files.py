@@ -10,6 +10,7 @@ from mmslam.formats.csv_columns import CsvGrid, read_csv_grid
 from mmslam.formats.hdf5_files import hdf5_array, is_hdf5
 from mmslam.formats.matlab_files import matlab_array
 from mmslam.formats.numpy_files import npy_array, npz_arrays
+from scenes.files.toml_reader import is_file
 
 LARGEST = 2**28
 """Most values of one array: 4 GiB as complex numbers. A file of some bytes can promise more."""
@@ -110,7 +111,7 @@ def format_of(path: Path) -> str:
     MeasurementError
         If there is no such file, or its suffix is unknown.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise MeasurementError(f"{path}: no such file; correct its name in the mapping")
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:

@@ -8,10 +8,18 @@ import re
 
 COORDINATES = ("x", "y", "z")
 
+MOST_STARS = 2
+"""Most stars of a pattern: each more takes the length of a name as many times as long. [-]"""
+
+_MOST_DIGITS = 9  # of a number in a file's name, before and behind its point
+
 _FIELD = re.compile(r"\{(\w*)\}|(\*)")
 _NUMBERS = {
-    "index": r"(?P<index>\d+)",
-    **{axis: rf"(?P<{axis}>[+-]?\d+(?:[.p]\d+)?)" for axis in COORDINATES},
+    "index": rf"(?P<index>\d{{1,{_MOST_DIGITS}}})",
+    **{
+        axis: rf"(?P<{axis}>[+-]?\d{{1,{_MOST_DIGITS}}}(?:[.p]\d{{1,{_MOST_DIGITS}}})?)"
+        for axis in COORDINATES
+    },
 }
 
 
@@ -24,6 +32,8 @@ def fields_of_pattern(pattern: str) -> list[str]:
         If a field is unknown or repeated, or there is none.
     """
     fields = [match[1] for match in _FIELD.finditer(pattern) if match[2] is None]
+    if pattern.count("*") > MOST_STARS:
+        raise ValueError(f"files: at most {MOST_STARS} stars can be told apart; use fewer")
     unknown = [field for field in fields if field not in _NUMBERS]
     if unknown or not fields or len(set(fields)) < len(fields):
         raise ValueError(

@@ -27,6 +27,7 @@ from mmslam.formats.mapping import (
 from mmslam.formats.plausibility import check_frequencies, check_positions, check_samples
 from mmslam.formats.touchstone_files import read_touchstone
 from mmslam.formats.touchstone_folder import SHOWN, FolderList, Scan, list_folder, read_scan
+from scenes.files.toml_reader import is_file
 
 Samples = Complex[np.ndarray, "positions freqs"]
 Frequencies = Float[np.ndarray, " freqs"]
@@ -153,7 +154,7 @@ class FolderReader:
 
     def _one_file(self, file: str, parameter: str) -> Signal:
         path = self._base / file
-        if not path.is_file():
+        if not is_file(path):
             raise MeasurementError(f"{path}: no such file; correct its name in the mapping")
         sweep = read_touchstone(path)
         scan = Scan(files=(path,), frequencies=sweep.frequencies, samples=sweep.samples[None])

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.measurement.model import MeasurementError
+from scenes.files.toml_reader import is_file
 
 LARGEST = 2**28
 """Most values of all arrays that are read, unless told otherwise."""
@@ -32,7 +33,7 @@ def npz_arrays(
     MeasurementError
         If it is no archive, is damaged, or holds pickled objects.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise MeasurementError(f"{path}: no such file")
     if not zipfile.is_zipfile(path):
         raise MeasurementError(
@@ -54,7 +55,7 @@ def npz_arrays(
         with np.load(path, allow_pickle=False) as archive:
             for name in archive.files:
                 if only is None or name == only:
-                    arrays[name] = archive[name]
+                    arrays[name] = _array(path, name, archive[name])
             if only is not None and only not in arrays:
                 found = ", ".join(sorted(archive.files)) or "nothing"
                 raise MeasurementError(f"{path}: no array {only!r} (found: {found}); choose one")
@@ -63,6 +64,14 @@ def npz_arrays(
     except Exception as error:  # zip, codecs and NumPy fail in many ways on a damaged file
         raise _pickled_or_damaged(path, error) from error
     return arrays
+
+
+def _array(path: Path, name: str, found: object) -> np.ndarray:
+    if not isinstance(found, np.ndarray):  # NumPy gives the bytes of any other member
+        raise MeasurementError(
+            f"{path}: {name!r} is no array; write the archive with numpy.savez_compressed"
+        )
+    return found
 
 
 def npy_array(path: Path) -> np.ndarray:

@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from estimator.measurement import model
 from estimator.results import estimate as plain
+from mmslam.plain_text import drawn_plainly
 from mmslam.table import Table, html, text
 from validation.metrics.truth import Truth
 
@@ -371,5 +372,6 @@ def _png(plot: Any) -> str:
     figure = Figure(figsize=_FIGURE, layout="constrained")
     plot(ax=figure.add_subplot())
     drawn = io.BytesIO()
+    drawn_plainly(figure)
     figure.savefig(drawn, dpi=_DOTS_PER_INCH, format="png", metadata={"Software": None})
     return base64.b64encode(drawn.getvalue()).decode("ascii")

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Image
 from mmslam import output
+from mmslam.plain_text import drawn_plainly
 from mmslam.results import pictures_3d
 from validation.figures import figures_2d, views
 from validation.figures.resolution_bars import draw_resolution_bars
@@ -86,6 +87,7 @@ def _saved(folder: Path, drawn: dict[str, Figure]) -> dict[str, Path]:
 
 def save(figure: Figure, path: Path) -> None:
     """Save a figure as PNG, the same bytes for the same figure and versions."""
+    drawn_plainly(figure)
     figure.savefig(path, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
 
 
@@ -228,9 +230,7 @@ def _legend(estimate: Estimate, truth_known: bool) -> Iterable[Line2D]:
     if any(user.path is not None for user in estimate.users):
         yield Line2D([], [], color=figures_2d.PATH, lw=1.6, label="path")
     if any(user.position is not None for user in estimate.users):
-        yield Line2D(
-            [], [], color=figures_2d.USER, marker="o", ls="", label=r"user, 1$\sigma$ and 2$\sigma$"
-        )
+        yield Line2D([], [], color=figures_2d.USER, marker="o", ls="", label="user, 1σ and 2σ")
     if truth_known:
         yield Line2D(
             [], [], color=figures_2d.INK, marker="o", mfc="none", ms=9, ls="", label="true user"

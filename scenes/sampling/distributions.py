@@ -11,6 +11,7 @@ from jaxtyping import Float
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from scenes.schema.errors import ScenarioError
 from scenes.schema.quantities import Checked, Position
 
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
@@ -20,6 +21,8 @@ MOST_VALUES = 100_000
 
 Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1, max_length=MOST_VALUES)]
 
+_PROBES = 4000  # of a polygon's box: none inside, though 1 in 1000 is, has a chance of 0.02
+_MOST_TRIES_INSIDE = 300_000  # seconds; at one in 10 000 inside, they fail once in e^30
 _MOST_TRIES = 10_000  # of a truncated normal distribution; it keeps at least 1 % (see below)
 
 LEAST_KEPT = 0.01
@@ -242,7 +245,16 @@ class InPolygon(Checked):
             _check_range(self.low_z_m, self.high_z_m)
         corners = self._plan
         size = np.ptp(corners, axis=0).prod()
-        if abs(_signed_area(corners)) < LEAST_FILLED * size or size == 0:
+        # Of a random point of the box around it, at least one in a thousand must be inside.
+        # Its area does not tell if it crosses itself: gone round twice, it has no inside.
+        few = np.random.default_rng(0).uniform(
+            corners.min(axis=0), corners.max(axis=0), size=(_PROBES, 2)
+        )
+        if (
+            abs(_signed_area(corners)) < LEAST_FILLED * size
+            or size == 0
+            or not any(_inside(float(x), float(y), corners) for x, y in few)
+        ):
             raise PydanticCustomError(
                 "polygon", "the corners enclose (almost) nothing; give them in order around it"
             )
@@ -256,10 +268,11 @@ class InPolygon(Checked):
         """Draw a position. [m]."""
         corners = self._plan
         low, high = corners.min(axis=0), corners.max(axis=0)
-        while True:
+        for _ in range(_MOST_TRIES_INSIDE):
             x, y = (float(v) for v in rng.uniform(low, high))
             if _inside(x, y, corners):
                 return [x, y, float(rng.uniform(self.low_z_m, self.high_z_m))]
+        raise ScenarioError("corners_m enclose (almost) nothing; give them in order around it")
 
     def extremes(self) -> tuple[object, ...]:
         """Return the corners. [m]."""

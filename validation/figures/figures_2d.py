@@ -298,7 +298,7 @@ def draw_close_up(
             minor, major = 2 * factor * deviations
             ax.add_patch(Ellipse((x, y), major, minor, angle=angle, color=USER, alpha=alpha, lw=0))
         reach = max(reach, float(np.hypot(x, y)) + 2.2 * float(deviations.max()))
-    ax.plot(x, y, "o", color=USER, ms=7, mec="white", label=r"estimate, 1$\sigma$ and 2$\sigma$")
+    ax.plot(x, y, "o", color=USER, ms=7, mec="white", label="estimate, 1σ and 2σ")
     if truth is not None:
         ax.plot(0, 0, "o", mfc="none", mec=INK, ms=12, mew=1.4, label="truth")
         error = 1e3 * float(np.linalg.norm(user.position - truth))
