@@ -38,7 +38,12 @@ from mmslam.formats.numpy_files import npz_arrays
 from mmslam.formats.touchstone_files import read_touchstone, touchstone_text
 from mmslam.output import OutputError
 from mmslam.plain_text import message
-from scenes.files.loading import load_scenario, scenario_source, scenario_to_toml
+from scenes.files.loading import (
+    ScenarioSource,
+    load_scenario,
+    scenario_source,
+    scenario_to_toml,
+)
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.meshes.mitsuba_xml import read_mitsuba_xml
 from scenes.sampling.sample_space import open_sample_space
@@ -347,9 +352,9 @@ FORMATS = [
     Format(
         name="scenario tables",
         inputs=changed_tables(SLAM),
-        read=lambda folder, tables: scenario_source("slam_2d").variant(
-            lambda held: (held.clear(), held.update(tables))  # type: ignore[func-returns-value]
-        ),
+        read=lambda folder, tables: ScenarioSource(
+            origin="it", tables=tables, folder=folder
+        ).variant(),
     ),
     Format(
         name="scenario files",
