@@ -12,7 +12,7 @@ from .facets import (
 from .mean_surfaces import mean_mirrors, rms_height
 from .mirrors import Mirrors, dot, line_mirrors
 from .patches import Patches, cut_into_patches, patch_side
-from .ray_scene import blocked, build_scene, facets_visible
+from .ray_scene import RayScene, blocked, build_scene, facets_visible
 
 __all__ = [
     "Face",
@@ -20,6 +20,7 @@ __all__ = [
     "Group",
     "Mirrors",
     "Patches",
+    "RayScene",
     "Relief",
     "blocked",
     "build_scene",

@@ -1,3 +1,4 @@
+from .chain_count import Sees, check_chains
 from .diffuse_echo_3d import diffuse_echo
 from .diffuse_field_3d import diffuse_wave
 from .frequency_interpolation import nodes_for_chain
@@ -5,7 +6,9 @@ from .multibounce_2d import SeveralProgress, ghost_echo, untold, uplink_over_sur
 from .multibounce_3d import coherent_echo, echo_over_mirrors
 
 __all__ = [
+    "Sees",
     "SeveralProgress",
+    "check_chains",
     "coherent_echo",
     "diffuse_echo",
     "diffuse_wave",

@@ -1,7 +1,8 @@
-from .impairments import position_jitter
+from .impairments import complex_noise, position_jitter
 from .receiver import received
 
 __all__ = [
+    "complex_noise",
     "position_jitter",
     "received",
 ]

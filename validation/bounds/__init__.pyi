@@ -1,4 +1,5 @@
-from .cramer_rao import broadside_range_bound, cramer_rao_bound, numerical_fisher, spherical_wave
+from .cramer_rao import cramer_rao_bound
+from .no_bound import NoBound
 from .position_bound import (
     Plane,
     PositionBound,
@@ -16,19 +17,17 @@ from .wall_bound import (
 )
 
 __all__ = [
+    "NoBound",
     "Plane",
     "PositionBound",
-    "broadside_range_bound",
     "cramer_rao_bound",
     "image_and_slopes",
     "line_covariance",
     "noise_depth_deviation",
-    "numerical_fisher",
     "plane_axes",
     "position_error_bound",
     "scenario_position_bound",
     "speckle_depth_deviation",
-    "spherical_wave",
     "spherical_waves",
     "user_waves",
     "wall_covariance_bound",

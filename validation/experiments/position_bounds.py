@@ -39,14 +39,8 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from estimator.channel.angle_range_map_2d import (
-    angle_range_map,
-    default_angles,
-    default_path_lengths,
-)
-from estimator.channel.path_extraction_2d import find_paths
 from estimator.localization.pipeline import locate
-from estimator.localization.stages_2d import MAP_SAMPLES
+from estimator.localization.stages_2d import LinearStages
 from estimator.measurement.model import Uplink
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
@@ -330,20 +324,15 @@ def _path_error(
 ) -> float | None:
     """Take a pilot's strongest path, unfold it, and compare; None if none stands out of the noise.
 
-    The path is the one that :func:`estimator.localization.pipeline.locate` finds: the same map of
-    the same angles and lengths, the same search, the same fit. The wall alone is given.
+    The stage is that of :func:`estimator.localization.pipeline.locate`: the same map of the same
+    angles and lengths, the same search, the same fit. The wall alone is given.
     """
-    looked = angle_range_map(
-        pilot,
-        aoa=default_angles(pilot, cells=MAP_SAMPLES),
-        path_length=default_path_lengths(pilot, cells=MAP_SAMPLES),
-        centre=np.zeros(3),
-    )
-    paths = find_paths(pilot, looked).paths
-    if not paths:
+    heard = LinearStages().hear(pilot, clock_known=True).paths.paths
+    if not heard:
         return None
-    wave = paths[0].wave
-    found = wave.path_length * np.array([np.cos(wave.aoa), np.sin(wave.aoa), 0.0])
+    wave = heard[0].wave
+    (aoa,) = wave.bearing
+    found = wave.path_length * np.array([np.cos(aoa), np.sin(aoa), 0.0])
     for plane in planes:
         found = _unfolded(found, plane)
     return float(np.linalg.norm(found - user))
