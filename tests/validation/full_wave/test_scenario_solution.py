@@ -184,7 +184,7 @@ def test_what_full_wave_cannot_do_is_refused_with_its_remedy(
     apart = small({"post": POST}, base_station=offset, max_bounces=1)
     refused(apart, "remove these keys")
     points = {"one": {"position_m": [0.0, 0.1]}}
-    refused(small({"post": POST}, points=points), "give a small cylinder")
+    refused(small({"post": POST}, points=points, waves="spherical"), "give a small cylinder")
     near = {**POST, "centre_m": [0.0165, 0.2]}
     refused(small({"post": POST, "near": near}), "mm apart or cross; full wave needs")
     close = {"user": {"position_m": [0.01, 0.2033]}}
