@@ -187,8 +187,9 @@ def test_what_full_wave_cannot_do_is_refused_with_its_remedy(
     refused(small({"post": POST}, points=points, waves="spherical"), "give a small cylinder")
     near = {**POST, "centre_m": [0.0165, 0.2]}
     refused(small({"post": POST, "near": near}), "mm apart or cross; full wave needs")
-    close = {"user": {"position_m": [0.01, 0.2033]}}
-    refused(small({"post": POST}, users=close), "needs .* mm between antennas and bodies")
+    within = {"user": {"position_m": [-0.0035, 0.2035]}}  # 5 mm behind a board of 12.7 mm
+    board = small({"wall": {**PLATE, "material": "drywall"}}, users=within)
+    refused(board, "users.user is within objects.wall")
     monkeypatch.setattr(module, "MOST_UNKNOWNS", 50)
     refused(small({"post": POST}), "make objects smaller, objects.post first")
 
