@@ -77,7 +77,7 @@ SPECTRUM_BINS = 256
 MOST_ALONG = 0.9999
 """Most grazing component along a line that weights are worked out for: 0.8° over it. [-]"""
 
-Ways = tuple[Float[np.ndarray, " facets"], Float[np.ndarray, " facets"]]
+Ways = tuple[Float[np.ndarray, "#facets"], Float[np.ndarray, "#facets"]]
 """Components of the directions to an antenna: along the line, and along its normal (> 0)."""
 
 
@@ -222,9 +222,9 @@ class RoughLine:
         return np.asarray(np.sqrt(epsilon - along**2))
 
     def _filtered(
-        self, along: Float[np.ndarray, " facets"]
+        self, along: Float[np.ndarray, "#facets"]
     ) -> Complex[np.ndarray, "parts nodes facets"]:
-        """Filter the heights, for the direction at each facet. [m]."""
+        """Filter the heights, for the direction at each facet, or one for all. [m]."""
         if along.size == 1:
             return self._field(float(along[0]))
         below = np.floor(along / STEP).astype(np.int64)
