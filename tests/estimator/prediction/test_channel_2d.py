@@ -435,7 +435,7 @@ def test_a_user_without_a_position_has_no_predicted_channel() -> None:
 @pytest.mark.parametrize("max_bounces", [0, 1, 2, 3, 8])
 def test_between_parallel_walls_paths_have_as_many_bounces_as_asked_for(max_bounces: int) -> None:
     # Array and user stand between two long walls: a path of each length over either wall first.
-    walls = [wall(-0.5, 0.0, 90.0, 40.0), wall(0.5, 0.0, 90.0, 40.0)]
+    walls = [wall(-0.5, 20.01, 90.0, 40.0), wall(0.5, 20.01, 90.0, 40.0)]  # before the array
     paths = predict_channel(
         at(0.1, 1.5), EXACT, walls, frequency=FREQUENCY, max_bounces=max_bounces
     )
