@@ -97,5 +97,5 @@ def field_vector(direction: Any, axis: Any, cross_polar: float = 0.0) -> Any:
     unit = scaled(part, chosen(length > ALONG_AXIS, 1.0 / at_least(length, ALONG_AXIS), 0.0))
     if cross_polar == 0.0:
         return unit
-    both = added(unit, cross(unit, direction), -cross_polar)
+    both = added(unit, cross(unit, direction), cross_polar)
     return scaled(both, 1.0 / math.sqrt(1.0 + cross_polar**2))
