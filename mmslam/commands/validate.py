@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from mmslam.output import OutputError
+from mmslam.output import OutputError, reserved
 from mmslam.terminal.interruption import ResumableInterruption
 from mmslam.terminal.stage_progress import StageProgress
 from validation.claims import ALL_CLAIMS
@@ -78,6 +78,18 @@ def check_claims(
     """
     claims, effort = chosen_claims(only, quick=quick), _effort(quick)
     _refuse_foreign(folder)
+    with reserved(folder):
+        return _checked(claims, effort, folder, fresh=fresh, shown=shown)
+
+
+def _checked(
+    claims: Sequence[Claim],
+    effort: Effort,
+    folder: Path,
+    *,
+    fresh: bool,
+    shown: Callable[[Any], None],
+) -> Mapping[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / SUMMARY).touch()
     runs = []

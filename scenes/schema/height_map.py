@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import ZipFile
 
 import numpy as np
 from jaxtyping import Float
 
-from scenes.schema.errors import ScenarioError
+from scenes.schema.errors import ScenarioError, shown_text
+
+LARGEST_FILE = 2**30
+"""Largest file of heights that is read, packed or unpacked. [byte]"""
 
 MOST_HEIGHTS = 2**27
 """Most heights of a file: 1 GiB in double precision. [-]"""
@@ -81,10 +84,16 @@ def read_height_map(path: Path, *, step: float | None, unit: float) -> HeightMap
         If the file cannot be read or holds no such heights; the message names value and remedy.
     """
     try:
-        changed = path.stat().st_mtime_ns
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from None
-    return _read(path, step, unit, changed)
+        status = path.stat()
+    except (OSError, ValueError) as error:  # a ValueError: a null character in the name
+        told = error.strerror if isinstance(error, OSError) else error
+        raise ScenarioError(f"{shown_text(str(path))}: cannot be read ({told})") from None
+    if not path.is_file() or status.st_size > LARGEST_FILE:
+        raise ScenarioError(
+            f"{path}: a file of at most {LARGEST_FILE} bytes is needed, this has {status.st_size}; "
+            "cut out a part"
+        )
+    return _read(path, step, unit, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
@@ -130,7 +139,9 @@ def _csv(path: Path) -> tuple[np.ndarray, float | None]:
         named = any(sign.isalpha() for sign in head.replace("e", "").replace("E", ""))
         values = np.loadtxt(path, delimiter=",", skiprows=1 if named else 0, ndmin=2)
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise ScenarioError(f"{path}: no table of numbers with commas ({error})") from None
+        raise ScenarioError(
+            f"{path}: no table of numbers with commas ({shown_text(str(error))})"
+        ) from None
     if values.shape[1] != 2:
         return values, None
     steps = np.diff(values[:, 0])
@@ -144,6 +155,10 @@ def _csv(path: Path) -> tuple[np.ndarray, float | None]:
 
 def _npz(path: Path) -> tuple[np.ndarray, float | None]:
     try:
+        with ZipFile(path) as packed:
+            promised = sum(entry.file_size for entry in packed.infolist())
+        if promised > LARGEST_FILE:
+            raise ScenarioError(f"{path}: {promised} bytes unpacked; cut out a part")
         with np.load(path, allow_pickle=False) as arrays:
             if "heights" not in arrays:
                 raise ScenarioError(
@@ -152,15 +167,18 @@ def _npz(path: Path) -> tuple[np.ndarray, float | None]:
                 )
             values = np.asarray(arrays["heights"], dtype=np.float64)
             step = float(arrays["step"]) if "step" in arrays else None
-    except (OSError, ValueError, TypeError, BadZipFile) as error:
-        raise ScenarioError(f"{path}: cannot be read as npz ({error})") from None
+    except ScenarioError:
+        raise
+    except Exception as error:  # zip, codecs and NumPy fail in many ways on a damaged file
+        told = shown_text(str(error))
+        raise ScenarioError(f"{path}: cannot be read as npz ({told})") from None
     if values.ndim not in (1, 2):
         raise ScenarioError(f"{path}: 'heights' has {values.ndim} dimensions; give 1 or 2")
     return values, step
 
 
 def _tiff(path: Path) -> np.ndarray:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         with Image.open(path) as image:
@@ -169,9 +187,17 @@ def _tiff(path: Path) -> np.ndarray:
                     f"{path}: a picture of {len(image.getbands())} colours, no height map; export "
                     "heights as one channel"
                 )
+            if image.width * image.height > MOST_HEIGHTS:
+                raise ScenarioError(
+                    f"{path}: {image.width} x {image.height} heights, more than "
+                    f"{MOST_HEIGHTS:.3g}; cut out a part"
+                )
             return np.asarray(image, dtype=np.float64)
-    except (OSError, UnidentifiedImageError) as error:
-        raise ScenarioError(f"{path}: cannot be read as TIFF ({error})") from None
+    except ScenarioError:
+        raise
+    except Exception as error:  # Pillow fails in many ways on a damaged file
+        told = shown_text(str(error))
+        raise ScenarioError(f"{path}: cannot be read as TIFF ({told})") from None
 
 
 def _levelled(heights: np.ndarray) -> np.ndarray:

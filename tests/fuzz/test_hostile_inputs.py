@@ -49,6 +49,7 @@ from scenes.meshes.mitsuba_xml import read_mitsuba_xml
 from scenes.sampling.sample_space import open_sample_space
 from scenes.sampling.variations import Variations, load_variations
 from scenes.scenario import ScenarioError
+from scenes.schema.height_map import read_height_map
 from scenes.schema.objects import MeshFile
 from scenes.schema.permittivity_table import read_permittivity_table
 from validation.metrics.truth import read_truth
@@ -343,6 +344,28 @@ def overrides() -> st.SearchStrategy[list[str]]:
     return st.lists(one.map("=".join) | st.text(max_size=30), min_size=1, max_size=3)
 
 
+def _tiff(stream: Any) -> None:
+    from PIL import Image
+
+    Image.fromarray(HEIGHTS.astype(np.float32)).save(stream, format="TIFF")
+
+
+HEIGHTS = np.sin(np.arange(400.0)).reshape(20, 20)
+HEIGHT_MAPS = {
+    "csv": of_bytes(lambda stream: np.savetxt(stream, HEIGHTS, delimiter=",")),
+    "npz": of_bytes(lambda stream: np.savez_compressed(stream, heights=HEIGHTS, step=0.1)),
+    "tif": of_bytes(_tiff),
+}
+
+
+def read_heights(kind: str) -> Callable[[Path, bytes], object]:
+    def read(folder: Path, content: bytes) -> object:
+        path = written(folder, f"it.{kind}", content)
+        return read_height_map(path, step=1e-4, unit=1e-3)
+
+    return read
+
+
 SLAM = dict(scenario_source("slam_2d").tables)
 SLAM_TEXT = scenario_to_toml(load_scenario("slam_2d")).encode()
 TOUCHSTONE = touchstone_text(np.linspace(1e9, 2e9, 5), ECHO[0, :5], ports=2, comment="x").encode()
@@ -393,6 +416,10 @@ FORMATS = [
     *(
         Format(name=f".{kind}", inputs=changed_bytes(content), read=read_mesh(kind))
         for kind, content in MESHES.items()
+    ),
+    *(
+        Format(name=f"heights .{kind}", inputs=changed_bytes(content), read=read_heights(kind))
+        for kind, content in HEIGHT_MAPS.items()
     ),
     Format(
         name="xml",
