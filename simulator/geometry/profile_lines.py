@@ -22,6 +22,9 @@ CORNER = np.radians(20.0)
 """Turn of the mean course from one facet to the next from which on it is an edge: a cylinder's
 coarsest facets turn by 6°. [rad]"""
 
+LEAST_HEIGHT = 1e-12
+"""Height that rounding leaves on a smooth surface some metres away. [m]"""
+
 EVEN = 0.01
 """Relative spread of the steps along a run up to which it counts as evenly sampled. [-]"""
 
@@ -46,7 +49,7 @@ class Run:
     @property
     def rough(self) -> bool:
         """Whether the surface leaves its mean course at all."""
-        return bool(np.any(self.heights != 0.0))
+        return bool(np.any(np.abs(self.heights) > LEAST_HEIGHT))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +102,7 @@ def outline(surface: Surface, first: int = 0) -> Outline:
     for members, closed in parts:
         here, height = heights[members], np.zeros(len(members))
         step = float(steps[members].mean())
-        if np.any(here != 0.0) and len(members) > 3 and np.ptp(steps[members]) < EVEN * step:
+        if np.any(np.abs(here) > LEAST_HEIGHT) and len(members) > 3 and np.ptp(steps[members]) < EVEN * step:
             height, slope = _fitted(here, closed)
             lifted = (height - here.mean(axis=1))[:, None]
             turned = (slope - (here[:, 1] - here[:, 0]))[:, None]

@@ -40,9 +40,9 @@ from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_ne
 from simulator.scattering.edge_diffraction import edge_echo, edge_view
 from simulator.scattering.rough_triangles import rough_weights
 from simulator.scattering.small_slope import (
-    MOST_ALONG,
-    GridOfWeights,
+    DirectionGrid,
     RoughLine,
+    echo_weights,
     reflection_of_front,
 )
 from simulator.scattering.triangle_transform import triangle_transform
@@ -234,7 +234,7 @@ class _Part:
                 self.material, frequencies, polarization=self.polarization
             )
         self._totals: dict[float, FrequencySum] = {}
-        self._grids: dict[tuple[int, int, float, float], GridOfWeights] = {}
+        self._lines: dict[tuple[int, float, int], tuple[RoughLine, DirectionGrid]] = {}
         self._lock = threading.Lock()
 
     def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
@@ -281,10 +281,18 @@ class _Part:
             chosen = np.flatnonzero(run.places[some] >= 0)
             for side in (1.0, -1.0):
                 here = chosen[np.sign(inward.cosine[some[chosen]]) == side]
-                if here.size:
-                    grid = self._grid(number, inward, side, nodes, facets)
-                    along = outward.along(facets, some[here])
-                    weights[:, here] = grid(along, run.places[some[here]])
+                if here.size == 0:
+                    continue
+                line, echoes = self._rough_line(number, side, nodes)
+                which, places = some[here], run.places[some[here]]
+                if self.monostatic:
+                    weights[:, here] = echoes(inward.along(facets, which), places)
+                else:
+                    ways = [
+                        (leg.along(facets, which), np.abs(leg.cosine[which]))
+                        for leg in (inward, outward)
+                    ]
+                    weights[:, here] = line.weights(*ways, places, side=side, monostatic=False)
         if self.common is not None:
             half = reflection_of_front(self.material, nodes, polarization=self.polarization)
             weights[:, facets.rough[some]] /= half[:, None]
@@ -313,19 +321,13 @@ class _Part:
         mirrored = self._coefficients(inward, outward, some, nodes, flat=False)
         return np.asarray(mirrored * cosines + added)
 
-    def _grid(
-        self,
-        number: int,
-        inward: "_Leg",
-        side: float,
-        nodes: Float[np.ndarray, " nodes"],
-        facets: Facets,
-    ) -> GridOfWeights:
-        """Weights of a run for one transmitter: kept while it is the same one."""
-        run = self.runs[number]
-        key = (number, 0 if self.monostatic else id(inward), side, float(nodes.size))
+    def _rough_line(
+        self, number: int, side: float, nodes: Float[np.ndarray, " nodes"]
+    ) -> tuple[RoughLine, DirectionGrid]:
+        """Return a run's line at these nodes, and its weights for echoes."""
+        run, key = self.runs[number], (number, side, nodes.size)
         with self._lock:
-            if key not in self._grids:
+            if key not in self._lines:
                 line = RoughLine(
                     heights=run.heights,
                     step=run.step,
@@ -334,15 +336,8 @@ class _Part:
                     polarization=self.polarization,
                     nodes=nodes,
                 )
-                sent = None
-                if not self.monostatic:
-                    # Where the run turns away from the transmitter, its weights are not asked for.
-                    grazing = 1 - MOST_ALONG**2
-                    cosine = np.maximum(side * inward.cosine[run.facets], np.sqrt(grazing))
-                    sent = inward.along(facets, run.facets), cosine
-                    self._grids = {k: grid for k, grid in self._grids.items() if k[1] == key[1]}
-                self._grids[key] = GridOfWeights(line, sent, side)
-            return self._grids[key]
+                self._lines[key] = line, echo_weights(line, side=side)
+            return self._lines[key]
 
     def _coefficients(
         self,

@@ -51,10 +51,12 @@ References
 
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Complex64, Float, Int
 from scipy.constants import speed_of_light
 
 from scenes.schema.radio import Polarization
@@ -164,7 +166,7 @@ def reflection_of_front(
 class RoughLine:
     """One run of facets, of one material, at the frequencies that its weights are sampled at.
 
-    The weights of a transmitter are worked out once for each direction of a grid, at all facets.
+    Filtered heights are worked out once for each direction of a grid, at all facets.
     """
 
     heights: Float[np.ndarray, " facets"]  # [m]
@@ -175,21 +177,30 @@ class RoughLine:
     nodes: Float[np.ndarray, " nodes"]  # [Hz]
 
     def weights(
-        self, transmit: Ways, receive: Ways, *, side: float, monostatic: bool
+        self,
+        transmit: Ways,
+        receive: Ways,
+        some: Int[np.ndarray, " facets"] | None = None,
+        *,
+        side: float,
+        monostatic: bool,
     ) -> Complex[np.ndarray, "nodes facets"]:
-        r"""Evaluate N of all facets.
+        r"""Evaluate N of some or all facets.
 
         Parameters
         ----------
         transmit, receive
-            Directions to both antennas: at all facets, or one for all of them.
+            Directions to both antennas: at these facets, or one for all of them.
+        some
+            Which facets; None: all.
         side
             1 where the antennas are on the side that heights rise to, -1 on the other. [-]
         monostatic
             Whether both are the same. A slab's back is left out then: it changes the echo of all
             facets alike, but for the angle.
         """
-        height = side * self.heights
+        heights = self.heights if some is None else self.heights[some]
+        height = side * heights
         (t_i, q_i), (t_s, q_s) = transmit, receive
         total = q_i + q_s
         pair = self.material, transmit, receive, self.nodes
@@ -204,9 +215,9 @@ class RoughLine:
                 weight = weight + 2 * (whole.mirror - first.mirror) / total
                 weight = weight + 2j * wavenumber * rest * height
         if dielectric and self.polarization == "horizontal":
-            return np.broadcast_to(weight, (self.nodes.size, self.heights.size))
-        sent = side * self._filtered(t_i)
-        heard = sent if monostatic else side * self._filtered(t_s)
+            return np.broadcast_to(weight, (self.nodes.size, heights.size))
+        sent = side * self._filtered(t_i, some)
+        heard = sent if monostatic else side * self._filtered(t_s, some)
         if self.polarization == "horizontal":
             again = _twice_scattered(sent, t_i, t_s) + _twice_scattered(heard, t_s, t_i)
             filtered = (2 / total) * again - first.bragg * height
@@ -222,25 +233,17 @@ class RoughLine:
         return np.asarray(np.sqrt(epsilon - along**2))
 
     def _filtered(
-        self, along: Float[np.ndarray, "#facets"]
+        self, along: Float[np.ndarray, "#facets"], some: Int[np.ndarray, " facets"] | None
     ) -> Complex[np.ndarray, "parts nodes facets"]:
-        """Filter the heights, for the direction at each facet, or one for all. [m]."""
+        """Filter the heights, for one direction or for that at each facet. [m]."""
         if along.size == 1:
-            return self._field(float(along[0]))
-        below = np.floor(along / STEP).astype(np.int64)
-        found: Complex[np.ndarray, "parts nodes facets"] | None = None
-        last: tuple[int, np.ndarray] | None = None
-        for index in range(int(below.min()), int(below.max()) + 1):
-            here = np.flatnonzero(below == index)
-            one = last[1] if last and last[0] == index else self._field(index * STEP)
-            other = self._field((index + 1) * STEP)
-            last = index + 1, other
-            if found is None:
-                found = np.empty_like(one)
-            share = along[here] / STEP - index
-            found[..., here] = one[..., here] + (other - one)[..., here] * share
-        assert found is not None
-        return found
+            field = self._field(float(along[0]))
+            return field if some is None else field[..., some]
+        return self._bank(along, np.arange(self.heights.size) if some is None else some)
+
+    @cached_property
+    def _bank(self) -> "DirectionGrid":
+        return DirectionGrid(self._field, self.heights.size)
 
     def _field(self, along: float) -> Complex[np.ndarray, "parts nodes facets"]:
         """Filter the heights, for one direction."""
@@ -280,40 +283,65 @@ class RoughLine:
         return np.array(found)
 
 
-class GridOfWeights:
-    """Weights of a rough line, for one transmitter, over the directions to the receivers."""
+class DirectionGrid:
+    """What depends on the facet and on one direction: known on a grid of directions.
 
-    def __init__(self, line: RoughLine, transmit: Ways | None, side: float) -> None:
-        """Prepare; without a transmitter, each receiver transmits itself."""
-        self.line, self.transmit, self.side = line, transmit, side
+    Between them it is interpolated linearly, from both antennas' directions alike: which of them
+    transmits makes no difference.
+    """
+
+    def __init__(
+        self, at: Callable[[float], Complex[np.ndarray, "*parts facets"]], facets: int
+    ) -> None:
+        """Prepare a function of the direction's component along the line."""
+        self._evaluate, self._facets = at, facets
         self._half = math.ceil(1 / STEP)
-        shape = (2 * self._half + 1, line.heights.size, line.nodes.size)
-        self._known = np.zeros(shape[0], dtype=bool)
-        self._weights = np.zeros(shape, dtype=np.complex64)  # pages are taken when written
+        self._known = np.zeros(2 * self._half + 1, dtype=bool)
+        self._values: Complex64[np.ndarray, "grid facets parts"] | None = None
+        self._parts: tuple[int, ...] = ()
         self._lock = threading.Lock()
 
     def __call__(
         self, along: Float[np.ndarray, " chosen"], some: Int[np.ndarray, " chosen"]
-    ) -> Complex[np.ndarray, "nodes chosen"]:
-        """Interpolate the weights of some facets, by the receiver's component along the line."""
+    ) -> Complex64[np.ndarray, "*parts chosen"]:
+        """Interpolate at some facets, by the component along the line at each of them."""
         places = along / STEP + self._half
         below = np.clip(places.astype(np.int64), 0, 2 * self._half - 1)
         with self._lock:
-            for index in range(int(below.min()), int(below.max()) + 2):
-                if not self._known[index]:
-                    self._weights[index] = self._at((index - self._half) * STEP).T
-                    self._known[index] = True
+            values = self._known_from(int(below.min()), int(below.max()) + 1)
         share = (places - below).astype(np.float32)[:, None]
-        one, other = self._weights[below, some], self._weights[below + 1, some]
-        return np.asarray((one + (other - one) * share).T)
+        one, other = values[below, some], values[below + 1, some]
+        other -= one
+        other *= share
+        other += one
+        return np.ascontiguousarray(other.T).reshape(*self._parts, some.size)
 
-    def _at(self, along: float) -> Complex[np.ndarray, "nodes facets"]:
-        # Grazing along the line, the normal component of the last place of the grid is 0.
-        inside = np.clip(along, -MOST_ALONG, MOST_ALONG)
-        receive = np.array([inside]), np.array([np.sqrt(1 - inside**2)])
-        alone = self.transmit is None
-        sent = receive if self.transmit is None else self.transmit
-        return self.line.weights(sent, receive, side=self.side, monostatic=alone)
+    def _known_from(self, low: int, high: int) -> Complex64[np.ndarray, "grid facets parts"]:
+        for index in range(low, high + 1):
+            if self._known[index]:
+                continue
+            # Grazing along the line, the normal component of the grid's last place would be 0.
+            found = self._evaluate(
+                float(np.clip((index - self._half) * STEP, -MOST_ALONG, MOST_ALONG))
+            )
+            if self._values is None:
+                self._parts = found.shape[:-1]
+                shape = (self._known.size, self._facets, math.prod(self._parts))
+                self._values = np.zeros(shape, dtype=np.complex64)  # pages are taken when written
+            self._values[index] = found.reshape(-1, self._facets).T
+            self._known[index] = True
+        assert self._values is not None
+        return self._values
+
+
+def echo_weights(line: RoughLine, *, side: float) -> DirectionGrid:
+    """Return the weights of a line for antennas that receive what they send."""
+
+    def at(along: float) -> Complex[np.ndarray, "nodes facets"]:
+        way = np.array([along]), np.array([np.sqrt(1 - along**2)])
+        return line.weights(way, way, side=side, monostatic=True)
+
+    return DirectionGrid(at, line.heights.size)
 
 
 def _twice_scattered(
