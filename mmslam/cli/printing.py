@@ -1,6 +1,6 @@
 """What commands print on stdout."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +25,15 @@ def print_outcome(result: Mapping[str, Any], folder: Path, as_json: bool) -> Non
         typer.echo(visible(line))
 
 
-def print_written(path: Path, measurement: Any, as_json: bool) -> None:
-    """Print what a measurement file holds."""
+def print_written(path: Path, measurement: Any, as_json: bool, notes: Sequence[str] = ()) -> None:
+    """Print what a measurement file holds, and what is to be known about it."""
     from mmslam.terminal.summary import measurement_summary
 
     summary = measurement_summary(measurement)
     if as_json:
-        print_json({"file": str(path), **summary})
+        print_json({"file": str(path), **summary, **({"notes": list(notes)} if notes else {})})
     else:
         told = [f"{key} {value}" for key, value in summary.items() if value is not None]
         typer.echo(visible(f"{path}: {', '.join(told)}"))
+        for note in notes:
+            typer.echo(visible(f"note: {note}"))

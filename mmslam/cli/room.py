@@ -106,6 +106,7 @@ def simulate(
         from mmslam.terminal.stage_progress import StageProgress
 
         loaded = mmslam.load_scenario(scenario, overrides or [])
+        notes: tuple[str, ...] = ()
         with stdout_kept_clean(), StageProgress() as progress:
             if full_wave:
                 from mmslam.full_wave import solve_to_file
@@ -119,9 +120,11 @@ def simulate(
                 )
             else:
                 from mmslam.pipeline import simulate_to_file
+                from simulator.scene.model_limits import model_notes
 
                 measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
-        print_written(output, measurement, as_json)
+                notes = model_notes(loaded)
+        print_written(output, measurement, as_json, notes)
 
 
 def locate(

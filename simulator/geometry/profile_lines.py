@@ -102,7 +102,11 @@ def outline(surface: Surface, first: int = 0) -> Outline:
     for members, closed in parts:
         here, height = heights[members], np.zeros(len(members))
         step = float(steps[members].mean())
-        if np.any(np.abs(here) > LEAST_HEIGHT) and len(members) > 3 and np.ptp(steps[members]) < EVEN * step:
+        if (
+            np.any(np.abs(here) > LEAST_HEIGHT)
+            and len(members) > 3
+            and np.ptp(steps[members]) < EVEN * step
+        ):
             height, slope = _fitted(here, closed)
             lifted = (height - here.mean(axis=1))[:, None]
             turned = (slope - (here[:, 1] - here[:, 0]))[:, None]

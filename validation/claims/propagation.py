@@ -220,7 +220,7 @@ def facet_grid(effort: Effort, tell: Tell) -> Finding:
 
 def _wall_echo(scenario: Scenario, spacing: float) -> Complex[np.ndarray, "positions freqs"]:
     surface = object_surface(scenario, "wall", seed=0, spacing=spacing)
-    facets, rays = surface_facets(surface), build_scene([surface])
+    facets, rays = surface_facets(surface), build_scene([surface], mean=True)
     places = scenario.base_station.element_positions
     array = ports(places, facets, facets_visible(rays, facets, places))
     return scattered(facets, array, array, scenario.radio.frequencies, waves="cylindrical")

@@ -49,7 +49,7 @@ def cylinders_echo(
         radius = float(two["cylinder_radius"][index])
         surfaces.append(circle(centre, radius, FACETS_ROUND, name=f"cylinder {index}"))
     facets = joined([surface_facets(surface) for surface in surfaces])
-    scene = build_scene(surfaces)
+    scene = build_scene(surfaces, mean=True)
     visible = facets_visible(scene, facets, positions)
     visible[:, len(surfaces[0].cells) :] = False  # no direct link
     return ghost_echo(

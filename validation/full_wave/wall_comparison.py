@@ -81,7 +81,7 @@ def simulated_links(
     """
     surface = profile_surface(reference["wall_profile"])
     facets = surface_facets(surface)
-    scene = build_scene([surface])
+    scene = build_scene([surface], mean=True)
     positions, frequencies = reference["aperture_position"], reference["frequency"]
 
     def ports(points: Float[np.ndarray, "ports 3"], pattern: Pattern, nodes: int = 1) -> Ports:

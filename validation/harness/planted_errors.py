@@ -94,6 +94,27 @@ PLANTED = (
         claims=("rough_plate_in_space",),
     ),
     PlantedError(
+        name="Bragg kernel of the other polarization in two dimensions",
+        file="simulator/scattering/small_slope.py",
+        right="bragg = -2 * q_i * q_s if vertical else 2 * (1 + t_i * t_s)",
+        wrong="bragg = -2 * (1 + t_i * t_s) if vertical else 2 * q_i * q_s",
+        claims=("full_wave_roughness",),
+    ),
+    PlantedError(
+        name="fringe currents of the wrong sign",
+        file="simulator/scattering/edge_diffraction.py",
+        right="return np.asarray(incident - sign * reflected - sign * flat)",
+        wrong="return -np.asarray(incident - sign * reflected - sign * flat)",
+        claims=("full_wave_roughness",),
+    ),
+    PlantedError(
+        name="rough walls hide themselves",
+        file="simulator/scene/radio_scene.py",
+        right="rays=build_scene(surfaces, mean=scenario.dimensions == 2)",
+        wrong="rays=build_scene(surfaces, mean=False)",
+        claims=("full_wave_roughness",),
+    ),
+    PlantedError(
         name="random phases at every position",
         file="simulator/response/echo.py",
         right="    return np.asarray(echo + ghosts)\n",

@@ -57,7 +57,7 @@ class Scene:
         parts = [surface_facets(one, of) for one, of in zip(surfaces, made, strict=True)]
         self.facets = joined(parts)
         self.firsts = np.cumsum([0, *(part.count for part in parts)])
-        self.rays = build_scene(surfaces)
+        self.rays = build_scene(surfaces, mean=True)
         self.faces = scattering_faces(self.facets)
         self.sees = MutualVisibility(self.rays, self.faces)
 

@@ -24,7 +24,9 @@ def test_an_edge_does_not_tell_which_end_transmits(one: float, other: float, fie
 
 
 @given(angles, angles, st.sampled_from(["vertical", "horizontal"]))
-def test_where_two_faces_make_a_plane_there_is_no_edge(one: float, other: float, field: str) -> None:
+def test_where_two_faces_make_a_plane_there_is_no_edge(
+    one: float, other: float, field: str
+) -> None:
     if abs(one + other - np.pi) < 1e-3:
         return  # at the mirror both terms are without bounds
     found = fringe(

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from validation.experiments.full_wave_roughness import (
-    BRAGG_DB,
-    EDGES_DB,
     Comparison,
     agreement,
     check,
@@ -21,12 +19,12 @@ from validation.experiments.full_wave_roughness import (
 GOOD = Comparison(
     rms_mm=0.15,
     correlation_mm=1.0,
-    echo=0.95,
+    echo=0.99,
     echo_level_db=-0.4,
     uplink=0.998,
-    uplink_level_db=-0.4,
+    uplink_level_db=-0.2,
     image=0.994,
-    image_level_db=1.0,
+    image_level_db=0.4,
 )
 TINY = (
     "base_station.elements=16",
@@ -40,15 +38,13 @@ TINY = (
 """A smaller radio and a nearer wall: a second for each roughness."""
 
 
-def test_the_simulator_is_too_bright_in_the_bragg_regime_and_right_in_the_uplink() -> None:
+def test_short_waved_heights_scatter_as_perturbation_theory_says() -> None:
     bragg = compare(0.02, 0.2, realisations=1, overrides=TINY)
-    assert bragg.image > 0.9
-    # 6.02 dB at 45°; a wall of 4 cm 0.2 m away is seen at 40 to 50° (5 to 7 dB), in 5 speckles.
-    assert bragg.image_level_db == pytest.approx(BRAGG_DB, abs=1.5)
-    assert bragg.uplink > 0.99
-    assert abs(bragg.uplink_level_db) < 0.3
-    assert bragg.trusted("uplink")
-    assert not bragg.trusted("image")
+    # Tangent planes gave 6 dB too much here.
+    assert bragg.echo > 0.992
+    assert abs(bragg.echo_level_db) < 0.5
+    assert bragg.uplink > 0.995
+    assert abs(bragg.uplink_level_db) < 0.1
 
 
 def test_the_same_fields_agree_and_twice_the_field_is_six_decibels_up() -> None:
@@ -62,43 +58,43 @@ def test_the_same_fields_agree_and_twice_the_field_is_six_decibels_up() -> None:
 def test_image_and_uplink_are_trusted_each_by_itself() -> None:
     assert GOOD.trusted("image")
     assert GOOD.trusted("uplink")
-    for wrong in (replace(GOOD, image=0.94), replace(GOOD, image_level_db=-2.1)):
+    for wrong in (replace(GOOD, image=0.94), replace(GOOD, image_level_db=-0.6)):
         assert not wrong.trusted("image")
         assert wrong.trusted("uplink")
-    for wrong in (replace(GOOD, uplink=0.94), replace(GOOD, uplink_level_db=-2.1)):
+    for wrong in (replace(GOOD, uplink=0.94), replace(GOOD, uplink_level_db=-0.6)):
         assert wrong.trusted("image")
         assert not wrong.trusted("uplink")
     assert replace(GOOD, echo=0.5, echo_level_db=-9.0).trusted("image")  # its edges
 
 
-def test_the_limits_are_those_of_the_literature() -> None:
-    assert pytest.approx(6.0206, abs=1e-4) == BRAGG_DB  # 1/cos² 45° = 2
-    assert pytest.approx(10 * np.log10(2 / 6)) == EDGES_DB  # (1 − √2)² + (1 + √2)² = 6
+def test_slopes_choose_what_is_claimed() -> None:
+    slopes = {(0.02, 0.2): 0.15, (0.05, 0.2): 0.35, (0.15, 1.0): 0.35, (0.15, 0.5): 0.60}
+    for (rms, length), limit in slopes.items():
+        limits = replace(GOOD, rms_mm=rms, correlation_mm=length).limits
+        assert limits is not None
+        assert limits.slope == limit
+    assert replace(GOOD, rms_mm=0.3, correlation_mm=0.2).limits is None
 
 
 def test_claims_that_hold_are_told() -> None:
-    bragg = replace(GOOD, rms_mm=0.02, correlation_mm=0.2, image_level_db=5.97)
-    smooth = replace(GOOD, rms_mm=0.02, correlation_mm=2.0, echo_level_db=-4.97)
-    unclaimed = replace(GOOD, correlation_mm=2.0, image=0.5)
-    told = check((GOOD, bragg, smooth, unclaimed))
-    assert len(told) == 3
-    assert "claimed 0.993, +1.1 dB" in told[0]
-    assert "+6.02 dB of the image by perturbation theory" in told[1]
-    assert "-4.77 dB of the echo by Keller's theory" in told[2]
+    told = check((GOOD, replace(GOOD, rms_mm=0.3, correlation_mm=0.2, echo=0.1)))
+    assert len(told) == 1
+    assert "claimed" in told[0]
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    "wrong",
     [
-        (replace(GOOD, image=0.97), "are allowed"),
-        (replace(GOOD, image_level_db=-0.5), "are allowed"),
-        (replace(GOOD, rms_mm=0.1, correlation_mm=0.5, uplink=0.98), "is below 0.99"),
-        (replace(GOOD, rms_mm=0.02, correlation_mm=0.3, image_level_db=4.9), "perturbation"),
-        (replace(GOOD, rms_mm=0.02, correlation_mm=2.0, echo_level_db=0.0), "Keller"),
+        replace(GOOD, echo=0.98),
+        replace(GOOD, echo_level_db=-0.6),
+        replace(GOOD, uplink=0.99),
+        replace(GOOD, uplink_level_db=0.4),
+        replace(GOOD, rms_mm=0.02, echo=0.99),
+        replace(GOOD, rms_mm=0.15, correlation_mm=0.5, echo_level_db=1.1),
     ],
 )
-def test_claims_that_do_not_hold_fail(wrong: Comparison, message: str) -> None:
-    with pytest.raises(RuntimeError, match=message):
+def test_claims_that_do_not_hold_fail(wrong: Comparison) -> None:
+    with pytest.raises(RuntimeError, match="falls short"):
         check((wrong,))
 
 
