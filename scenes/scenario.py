@@ -280,6 +280,11 @@ def _dimension_problems(scenario: Scenario) -> list[str]:
             "waves = 'cylindrical': possible in two dimensions only, and dimensions = 3; "
             "set waves = 'spherical'"
         )
+    if scenario.radio.polarization == "horizontal" and not flat:
+        found.append(
+            "radio.polarization = 'horizontal': possible in two dimensions only, and "
+            "dimensions = 3; set it to 'vertical'"
+        )
     points = {"base_station.position_m": scenario.base_station.position_m}
     if scenario.base_station.transmit_offset_m is not None:
         points["base_station.transmit_offset_m"] = scenario.base_station.transmit_offset_m

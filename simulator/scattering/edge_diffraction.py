@@ -195,7 +195,7 @@ def rough_end(
     *,
     polarization: Polarization,
 ) -> complex:
-    r"""What a flat end gives beyond that of the weights of a rough line, as a coefficient. [-].
+    r"""Return what a flat end gives beyond that of a rough line's weights, as a coefficient.
 
     The weight is :math:`2B/Q` in place of :math:`R\,Q`. A constant weight N that ends at an edge
     radiates like a coefficient :math:`-N / 2 (\hat s_i + \hat s_s)\cdot\hat e`, with

@@ -1,4 +1,4 @@
-r"""Rough lines beyond the tangent plane: the small-slope approximation of second order (Voronovich).
+r"""Rough lines beyond the tangent plane: Voronovich's small-slope approximation of second order.
 
 Along the mean course of a line, with heights h and unit vectors :math:`\hat s_i, \hat s_s` from it
 to both antennas, let t be their components along the line, q those along its normal, :math:`Q = q_i
@@ -26,9 +26,9 @@ dielectric, horizontal     :math:`B = \tfrac12 [(\varepsilon-1) q_i q_s (1-R_i)(
                            (\tfrac1\varepsilon - 1)\, t_i t_s (1+R_i)(1+R_s)], \quad E = 0`
 =========================  =======================================================================
 
-with :math:`q'(p) = \sqrt{\varepsilon - p^2}` and :math:`\gamma = q - q'`. "Vertical" is the electric
-field along z (TM of the cross-section, TE of the plane of incidence). B of a conductor and E of
-both verticals follow [1]_, [2]_; all were derived anew from the boundary conditions, for this form.
+with :math:`q'(p) = \sqrt{\varepsilon - p^2}` and :math:`\gamma = q - q'`. "Vertical" is the
+electric field along z (TM of the cross-section, TE of the plane of incidence). B of a conductor and
+E of both verticals follow [1]_, [2]_; all were derived anew from the boundary conditions.
 :math:`Z(p) = k^2 \langle (\xi h)^2 / q(p+\xi) \rangle`, over the line's own spectrum, is what
 roughness takes from a wave along a conductor in the horizontal polarization, which would otherwise
 run without loss (the smoothing method's mean wave [3]_).
@@ -156,7 +156,7 @@ def reflection_of_front(
     *,
     polarization: Polarization,
 ) -> Complex[np.ndarray, " nodes"]:
-    """Coefficient of a dielectric's front at normal incidence, without what its back returns. [-]."""
+    """Return a dielectric's coefficient at normal incidence, without what its back returns."""
     assert isinstance(material, Dielectric)
     one = _coefficient(material, np.ones(1), frequencies, polarization == "vertical", True)
     return np.asarray(one[:, 0])
@@ -227,7 +227,7 @@ class RoughLine:
         return np.asarray(weight + 1j * wavenumber * filtered)
 
     def _inner(self, along: Float[np.ndarray, " chosen"]) -> Complex[np.ndarray, "nodes chosen"]:
-        """Normal component within the dielectric. [-]."""
+        """Return the normal component within the dielectric. [-]."""
         assert isinstance(self.material, Dielectric)
         epsilon = self.material.permittivity(self.nodes)[:, None]
         return np.asarray(np.sqrt(epsilon - along**2))
@@ -266,7 +266,7 @@ class RoughLine:
     def _loss(
         self, between: Float[np.ndarray, "nodes waves"]
     ) -> Complex[np.ndarray, "nodes waves"]:
-        """What roughness takes from waves along the line, Z. [-]."""
+        """Return what roughness takes from waves along the line, Z. [-]."""
         window = np.hanning(self.heights.size) if not self.closed else 1.0
         power = np.abs(np.fft.fft(self.heights * window)) ** 2
         power *= np.mean(self.heights**2) / max(float(power.sum()), np.finfo(float).tiny)

@@ -110,7 +110,7 @@ def test_a_corrugated_conductor_returns_all_power(polarization: str, tolerance: 
 
 
 def test_small_heights_echo_by_the_cosine_squared() -> None:
-    # Perturbation theory: k σ small, the echo goes with 2 cos²θ for the vertical polarization and
+    # Perturbation theory, small heights: the echo goes with 2 cos²θ for the vertical polarization and
     # with 2 (1 + sin²θ) for the horizontal one, over 2 of the tangent plane at any angle.
     for sine in (0.34, 0.71, 0.94):
         vertical, horizontal = (
