@@ -123,7 +123,7 @@ def simulate(
                 from simulator.scene.model_limits import model_notes
 
                 measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
-                notes = model_notes(loaded)
+                notes = model_notes(loaded, seed=seed)
         print_written(output, measurement, as_json, notes)
 
 

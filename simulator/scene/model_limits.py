@@ -1,50 +1,50 @@
 """Where the model of a scenario is known to leave full wave: told, not refused."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario
-from scenes.schema.roughness import Roughness
+from simulator.geometry.profile_lines import Run, outline
 
-MOST_SLOPE = 0.6
-"""Rms slope up to which echo and pilot of a rough line were found within 1 dB of full wave
-(:mod:`validation.experiments.full_wave_roughness`). [-]"""
-
-MOST_HORIZONTAL = 0.25
-"""The same in the horizontal polarization, where waves run along a conductor; beyond it echoes
-off the normal were up to 2 dB too strong. [-]"""
-
-_WAVES = np.linspace(0.0, 12.0, 4001)
+MOST_SLOPE = {"vertical": 0.6, "horizontal": 0.25}
+"""Rms slope of a rough line, by polarization, up to which its echo and pilot were found within 1 dB
+of full wave (:mod:`validation.experiments.full_wave_roughness`). In the horizontal one waves run
+along a conductor, and an echo at 45° was 2 dB too strong beyond. [-]"""
 
 
-def rms_slope(rough: Roughness) -> float:
-    """Return the rms slope of a rough line. [-]."""
-    if rough.rms == 0:
+def rms_slope(run: Run) -> float:
+    """Return the rms slope of a run's heights, as its facets have them. [-]."""
+    if not run.rough:
         return 0.0
-    if rough.spectrum == "gaussian":
-        return float(np.sqrt(2)) * rough.rms / rough.correlation_length
-    waves = _WAVES / rough.inner_cutoff
-    power = np.exp(-((waves * rough.inner_cutoff) ** 2) / 4)
-    power /= 1 + (waves * rough.correlation_length) ** 2
-    return rough.rms * float(np.sqrt(np.sum(waves**2 * power) / np.sum(power)))
+    return float(np.sqrt(np.mean(np.diff(run.heights) ** 2))) / run.step
 
 
-def model_notes(scenario: Scenario) -> tuple[str, ...]:
+def model_notes(scenario: Scenario, *, seed: int) -> tuple[str, ...]:
     """Tell which surfaces are so steep that the simulator leaves full wave by more than 1 dB.
 
-    In three dimensions nothing is told: triangles are summed by tangent planes.
+    In three dimensions nothing is told: triangles are summed otherwise.
+
+    Parameters
+    ----------
+    scenario, seed
+        Which realisation.
     """
     if scenario.dimensions != 2:
         return ()
-    most = MOST_SLOPE if scenario.radio.polarization == "vertical" else MOST_HORIZONTAL
+    polarization = scenario.radio.polarization
     notes = []
     for name, body in scenario.objects.items():
-        if body.roughness is None or body.material == "absorber":
+        if body.material == "absorber":
             continue
-        slope = rms_slope(body.roughness)
-        if slope > most:
+        surface = object_surface(scenario, name, seed=seed)
+        runs = (replace(run, count=len(surface.cells)) for run in outline(surface).runs)
+        slope = max((rms_slope(run) for run in runs), default=0.0)
+        if slope > MOST_SLOPE[polarization]:
             notes.append(
-                f"objects.{name}.roughness: an rms slope of {slope:.2f} is more than {most:g}, up "
-                "to which the simulator was found within 1 dB of full wave; expect its diffuse "
-                "echo to be off by more (lower rms_mm or raise correlation_mm)"
+                f"objects.{name}.roughness: an rms slope of {slope:.2f} is more than "
+                f"{MOST_SLOPE[polarization]:g}, up to which the simulator was found within 1 dB of "
+                "full wave; its echo may be off by more (lower rms_mm, or raise correlation_mm)"
             )
     return tuple(notes)

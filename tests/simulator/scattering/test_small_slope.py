@@ -110,8 +110,8 @@ def test_a_corrugated_conductor_returns_all_power(polarization: str, tolerance: 
 
 
 def test_small_heights_echo_by_the_cosine_squared() -> None:
-    # Perturbation theory, small heights: the echo goes with 2 cos²θ for the vertical polarization and
-    # with 2 (1 + sin²θ) for the horizontal one, over 2 of the tangent plane at any angle.
+    # Perturbation theory of small heights: 2 cos²θ for the vertical polarization and
+    # 2 (1 + sin²θ) for the horizontal one, where the tangent plane has 2 at any angle.
     for sine in (0.34, 0.71, 0.94):
         vertical, horizontal = (
             kernels(Conductor(), ways(sine), ways(sine), NODES, polarization=one).bragg[0, 0]
