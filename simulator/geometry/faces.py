@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from scenes.schema.radio import Polarization
 from simulator.geometry.facets import Facets
+from simulator.geometry.profile_lines import Run
 from simulator.materials.layered_media import Material
 
 
@@ -25,6 +26,7 @@ class Face:
     material: Material
     rough: Bool[np.ndarray, " facets"]  # their normals and sizes are those of the mean course
     polarization: Polarization
+    runs: tuple[Run, ...] = ()  # of the whole set
 
     @property
     def count(self) -> int:
@@ -42,6 +44,7 @@ class Face:
             side=self.side,
             material=self.material,
             polarization=self.polarization,
+            runs=self.runs,
         )
 
 
@@ -63,6 +66,7 @@ def two_faces(
             material=material,
             rough=facets.rough[chosen],
             polarization=facets.polarization,
+            runs=facets.runs,
         )
         for side in sides
     )

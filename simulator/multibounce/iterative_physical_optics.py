@@ -120,6 +120,7 @@ def quadrature(face: Face, count: int) -> Face:
         material=face.material,
         rough=repeated.rough,
         polarization=face.polarization,
+        runs=face.runs,
     )
 
 

@@ -1,7 +1,8 @@
 """Rough faces in chains of surfaces: their weights, written as sources that chains can sum.
 
-Chains take the first order of :mod:`simulator.scattering.small_slope` only, at one frequency over
-the coefficient of the tangent plane there, and the ends of their facets without fringe currents.
+Chains take the weights of :mod:`simulator.scattering.small_slope` at one frequency, over the
+coefficient of the tangent plane there, and the ends of their facets without fringe currents. The
+second order is that of the way to the middle of what a wall sees of its target.
 """
 
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Float, Float32
 
 from simulator.geometry.faces import Face
-from simulator.scattering.small_slope import kernels
+from simulator.scattering.small_slope import MOST_ALONG, RoughLine, kernels
 
 LEAST_SPAN = 1e-3
 """Least half angle between the directions that a rough wall's weights are met in. [rad]"""
@@ -84,8 +85,40 @@ def rough_sources(
     matrix = np.stack(columns, axis=1)  # [wall, 3, 3]
     wanted = np.moveaxis(np.stack(values) / coefficient, 0, -1)  # [ports, wall, 3]
     found = np.moveaxis(np.linalg.solve(matrix, wanted[..., None])[..., 0], -1, 0)
+    outward = np.clip(np.sin(centre), -MOST_ALONG, MOST_ALONG)
+    found = found * second_order(wall, sent, (outward, np.sqrt(1 - outward**2)), frequency)
     plain = np.array([0.0, 0.0, 1.0])[:, None, None]
     return np.where(wall.rough, found, plain).astype(np.complex64)
+
+
+def second_order(
+    face: Face,
+    transmit: tuple[Float[np.ndarray, "ports facets"], Float[np.ndarray, "ports facets"]],
+    receive: tuple[Float[np.ndarray, "#ports facets"], Float[np.ndarray, "#ports facets"]]
+    | tuple[Float[np.ndarray, " facets"], Float[np.ndarray, " facets"]],
+    frequency: float,
+) -> Complex64[np.ndarray, "ports facets"]:
+    """Return the weights of the second order over those of the first, at rough facets. [-]."""
+    shape = transmit[0].shape
+    factor = np.ones(shape, dtype=np.complex64)
+    into = tuple(np.broadcast_to(part, shape) for part in receive)
+    for run in face.runs:
+        here = np.flatnonzero(run.places[face.source] >= 0)
+        if here.size == 0 or not run.rough:
+            continue
+        places = run.places[face.source[here]]
+        line = RoughLine(
+            heights=run.heights,
+            step=run.step,
+            closed=run.closed,
+            material=face.material,
+            polarization=face.polarization,
+            nodes=np.array([frequency]),
+        )
+        for port in range(shape[0]):
+            ways = [(t[port, here], q[port, here]) for t, q in (transmit, into)]
+            factor[port, here] = 1 + line.second_order(*ways, places, side=face.side)[0]
+    return factor
 
 
 def rough_factor(
@@ -109,7 +142,8 @@ def rough_factor(
     square = (sent[1] + heard[1]).ravel() ** 2
     along = (sent[0] + heard[0]).ravel() ** 2
     factor = both.bragg[0] / both.mirror[0] * (square + along) / square
-    return np.where(face.rough, factor.reshape(sent[0].shape), 1.0).astype(np.complex64)
+    factor = factor.reshape(sent[0].shape) * second_order(face, sent, heard, frequency)
+    return np.where(face.rough, factor, 1.0).astype(np.complex64)
 
 
 def _ways(

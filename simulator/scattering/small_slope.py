@@ -201,30 +201,47 @@ class RoughLine:
         """
         heights = self.heights if some is None else self.heights[some]
         height = side * heights
-        (t_i, q_i), (t_s, q_s) = transmit, receive
-        total = q_i + q_s
+        total = transmit[1] + receive[1]
         pair = self.material, transmit, receive, self.nodes
         first = kernels(*pair, polarization=self.polarization, half_space=True)
         weight = 2 * first.bragg / total
         wavenumber = 2 * np.pi * self.nodes[:, None] / speed_of_light
-        dielectric = isinstance(self.material, Dielectric)
         if isinstance(self.material, Dielectric) and not monostatic:
             if np.isfinite(self.material.thickness):
                 whole = kernels(*pair, polarization=self.polarization)
                 rest = whole.bragg - first.bragg - whole.mirror + first.mirror
                 weight = weight + 2 * (whole.mirror - first.mirror) / total
                 weight = weight + 2j * wavenumber * rest * height
+        again = self.second_order(transmit, receive, some, side=side, monostatic=monostatic)
+        return np.asarray(weight + 2 * first.bragg / total * again)
+
+    def second_order(
+        self,
+        transmit: Ways,
+        receive: Ways,
+        some: Int[np.ndarray, " facets"] | None = None,
+        *,
+        side: float,
+        monostatic: bool = False,
+    ) -> Complex[np.ndarray, "nodes facets"]:
+        """Evaluate what E adds, over 2B/Q. Parameters are those of :meth:`weights`. [-]."""
+        heights = self.heights if some is None else self.heights[some]
+        height = side * heights
+        (t_i, q_i), (t_s, q_s) = transmit, receive
+        total = q_i + q_s
+        wavenumber = 2 * np.pi * self.nodes[:, None] / speed_of_light
+        dielectric = isinstance(self.material, Dielectric)
         if dielectric and self.polarization == "horizontal":
-            return np.broadcast_to(weight, (self.nodes.size, heights.size))
+            return np.zeros((self.nodes.size, heights.size), dtype=np.complex128)
         sent = side * self._filtered(t_i, some)
         heard = sent if monostatic else side * self._filtered(t_s, some)
         if self.polarization == "horizontal":
             again = _twice_scattered(sent, t_i, t_s) + _twice_scattered(heard, t_s, t_i)
-            filtered = (2 / total) * again - first.bragg * height
+            filtered = again / (2 * (1 + t_i * t_s)) - 0.5 * total * height
         else:
             local = self._inner(t_i) + self._inner(t_s) - total if dielectric else -total
-            filtered = first.bragg / total * (sent[0] + heard[0] + local * height)
-        return np.asarray(weight + 1j * wavenumber * filtered)
+            filtered = 0.5 * (sent[0] + heard[0] + local * height)
+        return np.asarray(1j * wavenumber * filtered)
 
     def _inner(self, along: Float[np.ndarray, " chosen"]) -> Complex[np.ndarray, "nodes chosen"]:
         """Return the normal component within the dielectric. [-]."""

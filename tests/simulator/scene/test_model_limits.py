@@ -20,6 +20,6 @@ def test_a_steep_wall_is_told_and_a_gentle_one_is_not() -> None:
 def test_the_rms_slope_is_that_of_the_statistics() -> None:
     scenario = load_scenario("slam_2d", STEEP)
     (run,) = outline(object_surface(scenario, "wall", seed=0)).runs
-    # √2 σ/l; differences over a quarter of l have (1 - 1/32)^½ of it, and 1300 correlation lengths
+    # √2 rms/l; differences over a quarter of l have (1 - 1/32)^½ of it, 1300 correlation lengths
     # scatter by 2 %.
     assert rms_slope(run) == pytest.approx(np.sqrt(2) * 0.2 / 0.3, rel=0.06)
