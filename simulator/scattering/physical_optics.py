@@ -269,14 +269,11 @@ class _Part:
         if self.share is not None:
             return self._rough_triangles(inward, outward, some, nodes, facets)
         smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
-        obliquity = np.abs(inward.cosine[some[smooth]] + outward.cosine[some[smooth]])
-        flat = obliquity * self._coefficients(
-            inward, outward, some[smooth], nodes, flat=facets.flat
-        )
         if smooth.size == some.size:
-            return flat
+            return self._smooth(inward, outward, some, nodes, facets)
         weights = np.empty((nodes.size, some.size), dtype=np.complex128)
-        weights[:, smooth] = flat
+        if smooth.size:
+            weights[:, smooth] = self._smooth(inward, outward, some[smooth], nodes, facets)
         for number, run in enumerate(self.runs):
             chosen = np.flatnonzero(run.places[some] >= 0)
             for side in (1.0, -1.0):
@@ -297,6 +294,18 @@ class _Part:
             half = reflection_of_front(self.material, nodes, polarization=self.polarization)
             weights[:, facets.rough[some]] /= half[:, None]
         return weights
+
+    def _smooth(
+        self,
+        inward: "_Leg",
+        outward: "_Leg",
+        some: np.ndarray,
+        nodes: Float[np.ndarray, " nodes"],
+        facets: Facets,
+    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
+        obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
+        coefficients = self._coefficients(inward, outward, some, nodes, flat=facets.flat)
+        return np.asarray(obliquity * coefficients)
 
     def _rough_triangles(
         self,

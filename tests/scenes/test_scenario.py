@@ -358,7 +358,8 @@ REFUSED: list[tuple[Table, str]] = [
     ),
     (
         {"users__user__antenna": {"kind": "isotropic", "aim_deg": 0}},
-        r"^users\.user\.antenna\.aim_deg: unknown key; known for kind 'isotropic': polarization, cross_polar_db, kind",
+        r"^users\.user\.antenna\.aim_deg: unknown key; known for kind 'isotropic': polarization, "
+        "cross_polar_db, kind",
     ),
     (
         {"users__user__antenna": {"kind": "gaussian_beam", "sigma_rad": 0, "aim_deg": 0}},
