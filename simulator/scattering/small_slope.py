@@ -87,8 +87,8 @@ Ways = tuple[Float[np.ndarray, "#facets"], Float[np.ndarray, "#facets"]]
 class Kernels:
     """Of the flat and the slightly rough surface, signs included."""
 
-    bragg: Complex[np.ndarray, "#nodes facets"]  # B
-    mirror: Complex[np.ndarray, "#nodes facets"]  # K R
+    bragg: Complex[np.ndarray, "_ _"]  # B
+    mirror: Complex[np.ndarray, "_ _"]  # K R
 
 
 def kernels(
@@ -363,8 +363,8 @@ def echo_weights(line: RoughLine, *, side: float) -> DirectionGrid:
 
 def _twice_scattered(
     fields: Complex[np.ndarray, "parts nodes facets"],
-    near: Float[np.ndarray, " facets"],
-    far: Float[np.ndarray, " facets"],
+    near: Float[np.ndarray, "#facets"],
+    far: Float[np.ndarray, "#facets"],
 ) -> Complex[np.ndarray, "nodes facets"]:
     """Combine the fields of 1, p and p² to those of (1 - near p)(1 + far p)."""
     return np.asarray(fields[0] + (far - near) * fields[1] - near * far * fields[2])

@@ -50,7 +50,7 @@ def test_a_dielectric_of_large_permittivity_scatters_as_a_conductor(polarization
         line(heights, 4 * WAVELENGTH / 256, material, polarization).weights(
             ways(0.3), ways(0.5), side=1.0, monostatic=False
         )
-        for material in (half_space(1e10), Conductor())
+        for material in (half_space(1e10 + 0j), Conductor())
     ]
     if polarization == "horizontal":  # a dielectric's second order is left out there
         found = [np.broadcast_to(part.mean(), part.shape) for part in found]
