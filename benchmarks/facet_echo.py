@@ -94,7 +94,7 @@ def bare_rays(scene: RadioScene, positions: Float[np.ndarray, "positions 3"]) ->
         dr.eval(ray)
         dr.sync_thread()
         begin = time.perf_counter()
-        dr.eval(scene.rays.mi_scene.ray_test(ray))
+        dr.eval(scene.rays.scene.ray_test(ray))
         dr.sync_thread()
         seconds += time.perf_counter() - begin
     return seconds

@@ -33,7 +33,7 @@ class HeightMap:
     @property
     def profile(self) -> bool:
         """Whether there is a single line of heights."""
-        return self.heights.shape[1] == 1
+        return bool(self.heights.shape[1] == 1)
 
     @cached_property
     def rms(self) -> float:

@@ -1,5 +1,6 @@
 """The roughness of a surface: by statistics of its heights, or by measured heights."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -186,7 +187,7 @@ class Roughness(Scale):
     @property
     def rms(self) -> float:
         """Root mean square of the heights [m]."""
-        return sum((1e-3 * scale.rms_mm) ** 2 for scale in self.scales) ** 0.5
+        return math.sqrt(sum((1e-3 * scale.rms_mm) ** 2 for scale in self.scales))
 
     @property
     def measured(self) -> HeightMap | None:

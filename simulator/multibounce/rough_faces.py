@@ -116,8 +116,9 @@ def second_order(
             nodes=np.array([frequency]),
         )
         for port in range(shape[0]):
-            ways = [(t[port, here], q[port, here]) for t, q in (transmit, into)]
-            factor[port, here] = 1 + line.second_order(*ways, places, side=face.side)[0]
+            sent, heard = ((t[port, here], q[port, here]) for t, q in (transmit, into))
+            second = line.second_order(sent, heard, places, side=float(face.side))
+            factor[port, here] = 1 + second[0]
     return factor
 
 

@@ -139,7 +139,7 @@ def edge_echo(
         ways = sent.directions[index], heard.directions[index]
         back = len(faces) == 1 and ways[0] @ facets.normals[edge.facets[0], :2] < 0
         side = -1.0 if back else 1.0
-        strength = 0j
+        strength: np.ndarray | complex = 0j
         material = facets.material_of(edge.facets[0])
         if isinstance(material, Conductor):
             axes = edge.inward[0], side * facets.normals[edge.facets[0], :2]
@@ -211,4 +211,4 @@ def rough_end(
     over = complex(half.bragg[0, 0] - half.mirror[0, 0])
     if abs(along) < NUDGE:
         return 0j
-    return 0.5 * (2 * over / (across * along) + reflected * along / across)
+    return complex(0.5 * (2 * over / (across * along) + reflected * along / across))

@@ -285,11 +285,13 @@ class _Part:
                 if self.monostatic:
                     weights[:, here] = echoes(inward.along(facets, which), places)
                 else:
-                    ways = [
+                    sent, heard = (
                         (leg.along(facets, which), np.abs(leg.cosine[which]))
                         for leg in (inward, outward)
-                    ]
-                    weights[:, here] = line.weights(*ways, places, side=side, monostatic=False)
+                    )
+                    weights[:, here] = line.weights(
+                        sent, heard, places, side=side, monostatic=False
+                    )
         if self.common is not None:
             half = reflection_of_front(self.material, nodes, polarization=self.polarization)
             weights[:, facets.rough[some]] /= half[:, None]

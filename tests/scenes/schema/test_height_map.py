@@ -85,7 +85,7 @@ def test_a_wall_has_the_heights_that_were_measured(tmp_path: Path) -> None:
     scenario = parse_scenario(plate(tmp_path))
     surface = object_surface(scenario, "wall", seed=1, spacing=STEP)
     body = scenario.objects["wall"]
-    found = np.einsum("vx,x->v", surface.vertices - surface.mean_vertices, body.normal)  # type: ignore[union-attr]
+    found = np.einsum("vx,x->v", surface.vertices - surface.mean_vertices, body.normal)
     read = read_height_map(path, step=None, unit=1e-3)
     np.testing.assert_allclose(found.reshape(201, 151), read.heights[:201, :151], atol=1e-12)
     other = object_surface(scenario, "wall", seed=2, spacing=STEP)

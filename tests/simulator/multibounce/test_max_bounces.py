@@ -145,9 +145,9 @@ def test_a_body_in_the_paths_is_a_bounce_of_the_echo(bounces: int, mirrors: list
 
 def test_points_are_no_surfaces_and_return_without_a_bounce() -> None:
     points = {"point": {"position_m": [0.1, 1.0], "rcs_m2": 1e-3}}
+    changes: tuple[dict[str, Any], ...] = ({}, {"objects": {}})
     one, none = (
-        simulate(corridor(0, points=points, **more), seed=0).measurement.echo
-        for more in ({}, {"objects": {}})
+        simulate(corridor(0, points=points, **more), seed=0).measurement.echo for more in changes
     )
     assert one is not None
     assert none is not None

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenes.files.loading import load_scenario
+from scenes.schema.radio import Polarization
 from simulator.scattering.edge_diffraction import fringe
 from simulator.simulation import simulate
 from validation.experiments.full_wave_localization import WALL, strip_scene
@@ -15,7 +16,9 @@ angles = st.floats(0.05, np.pi - 0.05)
 
 
 @given(angles, angles, st.sampled_from(["vertical", "horizontal"]))
-def test_an_edge_does_not_tell_which_end_transmits(one: float, other: float, field: str) -> None:
+def test_an_edge_does_not_tell_which_end_transmits(
+    one: float, other: float, field: Polarization
+) -> None:
     there, back = (
         fringe(a, b, exterior=1.5, faces=(True, False), polarization=field)
         for a, b in ((np.array(one), np.array(other)), (np.array(other), np.array(one)))
@@ -25,7 +28,7 @@ def test_an_edge_does_not_tell_which_end_transmits(one: float, other: float, fie
 
 @given(angles, angles, st.sampled_from(["vertical", "horizontal"]))
 def test_where_two_faces_make_a_plane_there_is_no_edge(
-    one: float, other: float, field: str
+    one: float, other: float, field: Polarization
 ) -> None:
     if abs(one + other - np.pi) < 1e-3:
         return  # at the mirror both terms are without bounds
@@ -37,7 +40,7 @@ def test_where_two_faces_make_a_plane_there_is_no_edge(
 
 @pytest.mark.parametrize("exterior", [1.5, 2.0])
 @pytest.mark.parametrize("field", ["vertical", "horizontal"])
-def test_towards_the_mirror_the_fringe_is_finite(exterior: float, field: str) -> None:
+def test_towards_the_mirror_the_fringe_is_finite(exterior: float, field: Polarization) -> None:
     at, beside = (
         float(
             fringe(

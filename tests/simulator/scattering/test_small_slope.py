@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
+from scenes.schema.radio import Polarization
 from simulator.materials.layered_media import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.small_slope import RoughLine, echo_weights, kernels
@@ -11,7 +12,7 @@ from simulator.scattering.small_slope import RoughLine, echo_weights, kernels
 FREQUENCY = 260e9
 WAVELENGTH = speed_of_light / FREQUENCY
 NODES = np.array([FREQUENCY])
-POLARIZATIONS = ("vertical", "horizontal")
+POLARIZATIONS: tuple[Polarization, ...] = ("vertical", "horizontal")
 
 
 def half_space(permittivity: complex) -> Dielectric:
@@ -22,7 +23,9 @@ def ways(sine: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([sine]), np.array([np.sqrt(1 - sine**2)])
 
 
-def line(heights: np.ndarray, step: float, material: Material, polarization: str) -> RoughLine:
+def line(
+    heights: np.ndarray, step: float, material: Material, polarization: Polarization
+) -> RoughLine:
     return RoughLine(
         heights=heights,
         step=step,
@@ -36,14 +39,16 @@ def line(heights: np.ndarray, step: float, material: Material, polarization: str
 @pytest.mark.parametrize("polarization", POLARIZATIONS)
 @pytest.mark.parametrize("material", [Conductor(), half_space(2.5 - 0.1j)])
 def test_towards_the_mirror_a_slight_wave_and_a_tangent_plane_scatter_alike(
-    material: Material, polarization: str
+    material: Material, polarization: Polarization
 ) -> None:
     both = kernels(material, ways(-0.6), ways(0.6), NODES, polarization=polarization)
     np.testing.assert_allclose(both.bragg, both.mirror, rtol=1e-12)
 
 
 @pytest.mark.parametrize("polarization", POLARIZATIONS)
-def test_a_dielectric_of_large_permittivity_scatters_as_a_conductor(polarization: str) -> None:
+def test_a_dielectric_of_large_permittivity_scatters_as_a_conductor(
+    polarization: Polarization,
+) -> None:
     x = np.arange(256) / 256
     heights = 0.05 * WAVELENGTH * np.cos(2 * np.pi * x)
     found = [
@@ -60,7 +65,9 @@ def test_a_dielectric_of_large_permittivity_scatters_as_a_conductor(polarization
 
 @pytest.mark.parametrize("polarization", POLARIZATIONS)
 @pytest.mark.parametrize("material", [Conductor(), half_space(2.5 - 0.1j)])
-def test_weights_do_not_tell_which_end_transmits(material: Material, polarization: str) -> None:
+def test_weights_do_not_tell_which_end_transmits(
+    material: Material, polarization: Polarization
+) -> None:
     heights = 1e-4 * np.random.default_rng(1).standard_normal(200)
     rough = line(heights, 2e-4, material, polarization)
     there = rough.weights(ways(0.2), ways(-0.7), side=1.0, monostatic=False)
@@ -71,7 +78,7 @@ def test_weights_do_not_tell_which_end_transmits(material: Material, polarizatio
 @pytest.mark.parametrize("polarization", POLARIZATIONS)
 @pytest.mark.parametrize("material", [Conductor(), half_space(2.5 - 0.1j)])
 def test_a_flat_surface_that_is_moved_stays_a_flat_surface(
-    material: Material, polarization: str
+    material: Material, polarization: Polarization
 ) -> None:
     moved, still = (
         line(np.full(64, height), 2e-4, material, polarization).weights(
@@ -84,7 +91,9 @@ def test_a_flat_surface_that_is_moved_stays_a_flat_surface(
 
 
 @pytest.mark.parametrize(("polarization", "tolerance"), [("vertical", 1e-5), ("horizontal", 1e-4)])
-def test_a_corrugated_conductor_returns_all_power(polarization: str, tolerance: float) -> None:
+def test_a_corrugated_conductor_returns_all_power(
+    polarization: Polarization, tolerance: float
+) -> None:
     # Floquet orders of a plane wave; what is left out is of the fourth order of heights (1e-6),
     # and in the horizontal polarization the damping of waves along the surface, 1e-3 of 0.02.
     period, sine, depth = 1.7 * WAVELENGTH, 0.35, 0.006 * WAVELENGTH

@@ -163,7 +163,8 @@ def test_exchanging_transmitter_and_receiver_changes_nothing(seed: int) -> None:
     def response(sources: np.ndarray, receivers: np.ndarray) -> np.ndarray:
         chains = find_chains(mirrors, sources, receivers, blocked=clear_air)
         shape = (len(sources), len(receivers))
-        return specular_response(mirrors, chains, FREQUENCIES, shape, **along(polarization))
+        sent, received = along(polarization).values()
+        return specular_response(mirrors, chains, FREQUENCIES, shape, sent=sent, received=received)
 
     forth, back = response(here, there), response(there, here)
     # Phases of 1e5 rad (10 m) keep 1e-11; the design asks for 1e-6.
