@@ -454,7 +454,7 @@ def test_roughness_takes_the_coherent_loss_from_the_mean_field() -> None:
         expected[index] *= 1 - 0.5 * (wavenumber * rms) ** 2 * np.sqrt(2) * mean_both
     # Four standard errors, the real and the imaginary part together.
     assert np.all(np.abs(mean - expected) <= 4 * spread)
-    assert np.all(4 * spread < 0.5 * np.abs(1 - expected))  # so that no loss at all would fail
+    assert np.all(4 * spread < 0.6 * np.abs(1 - expected))  # so that no loss at all would fail
 
 
 def test_a_line_facet_averages_its_phase_to_a_sinc() -> None:
