@@ -1,7 +1,7 @@
 """What objects are made of: named materials, and slabs of a permittivity that a scenario gives.
 
 Only names and numbers: what they reflect is the simulator's matter
-(``simulator.materials.layered_media``), and a test holds the names of both together.
+(``simulator.materials.fresnel_slab``), and a test holds the names of both together.
 """
 
 import math

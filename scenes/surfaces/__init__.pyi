@@ -1,9 +1,9 @@
 from .facet_spacing import facet_count, mesh_facet_count, steps, steps_round
+from .height_synthesis import rough_profile, rough_sheet
 from .heights import Heights
 from .mesh_refinement import mesh_is_closed, mesh_surface, refined
 from .mesh_section_2d import lines_are_closed, mesh_lines, mesh_segments
 from .primitives import in_reach, shape_in_reach, upright_shape
-from .roughness_spectrum import rough_profile, rough_sheet
 from .shape import grid_triangles
 from .tiled_faces import Reach
 

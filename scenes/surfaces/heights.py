@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scenes.schema.height_map import HeightMap
 from scenes.schema.roughness import Roughness, Scale, Spectrum
 from scenes.surfaces.height_distribution import transformed
-from scenes.surfaces.roughness_spectrum import rough_profile, rough_sheet
+from scenes.surfaces.height_synthesis import rough_profile, rough_sheet
 
 SAMPLES_PER_DETAIL = 8
 """Grid points per correlation length (or inner cut-off) from which heights at arbitrary places
@@ -17,7 +17,7 @@ are interpolated: cubic splines through them are within 1e-3 of the rms height. 
 
 
 class Statistics(TypedDict):
-    """What is asked of :func:`scenes.surfaces.roughness_spectrum.rough_profile`."""
+    """What is asked of :func:`scenes.surfaces.height_synthesis.rough_profile`."""
 
     rms: float
     correlation_length: float

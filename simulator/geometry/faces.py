@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from scenes.schema.radio import Polarization
 from simulator.geometry.facets import Facets
 from simulator.geometry.profile_lines import Run
-from simulator.materials.layered_media import Material
+from simulator.materials.fresnel_slab import Material
 
 
 @dataclass(frozen=True, kw_only=True)

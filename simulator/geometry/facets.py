@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from scenes.realisations.object_surface import Surface
 from scenes.schema.radio import Polarization
-from scenes.surfaces.roughness_spectrum import slope_share
+from scenes.surfaces.height_synthesis import slope_share
 from simulator.geometry.profile_lines import Edge, Run, outline
-from simulator.materials.layered_media import Conductor, Material
+from simulator.materials.fresnel_slab import Conductor, Material
 
 SMOOTHED = 1 / 6
 """Standard width, over the wavelength, of the smoothing of slopes whose curvature counts. [-]"""

@@ -7,7 +7,7 @@ from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.geometry.mirrors import Mirrors, line_mirrors
-from simulator.materials.layered_media import Absorber, Conductor, Material
+from simulator.materials.fresnel_slab import Absorber, Conductor, Material
 
 MOST_FACES = 64
 """A mesh of more faces counts as curved, and is no mirror: chains grow as a power of them."""

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simulator.materials.layered_media import Material
+from simulator.materials.fresnel_slab import Material
 
 FLATNESS = 1e-6
 """Largest distance of a corner from the plane of its mirror: at 300 GHz 1 µm is 0.4° of

@@ -1,4 +1,15 @@
-from .layered_media import (
+from .facet_reflection import (
+    Legs,
+    Shares,
+    angle_class,
+    conductor_mirror,
+    echo_coefficient,
+    facet_coefficients,
+    half_angle_cosine,
+    mirror_shares,
+    reflection_nodes,
+)
+from .fresnel_slab import (
     Absorber,
     Conductor,
     Dielectric,
@@ -16,17 +27,6 @@ from .permittivity import (
     TabulatedPermittivity,
     itu_permittivity,
     read_permittivity,
-)
-from .reflection_coefficients import (
-    Legs,
-    Shares,
-    angle_class,
-    conductor_mirror,
-    echo_coefficient,
-    facet_coefficients,
-    half_angle_cosine,
-    mirror_shares,
-    reflection_nodes,
 )
 from .sionna_materials import radio_material, scattering_coefficient, sionna_slab
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
 from scenes.schema.radio import Polarization
-from simulator.materials.layered_media import Conductor, Material, reflection
+from simulator.materials.fresnel_slab import Conductor, Material, reflection
 
 TABLE_ACCURACY = 1e-5
 """Largest error of a coefficient half way between two angles of the table. [-]"""

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from estimator.compute import engine
-from simulator.materials.layered_media import Absorber, Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Absorber, Conductor, Dielectric, Material
 from simulator.materials.permittivity import MaterialError, conductivity
 
 mi.set_variant(engine.mitsuba_variant())

@@ -20,7 +20,7 @@ from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches
 from simulator.geometry.ray_scene import blocked
-from simulator.materials.reflection_coefficients import reflection_nodes
+from simulator.materials.facet_reflection import reflection_nodes
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, Factor, Look, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.specular.diffuse_chains import DIFFUSE_LEVEL, DiffuseLeg

@@ -15,8 +15,8 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.fft import dct
 
-from simulator.materials.layered_media import Conductor, Material, reflection
-from simulator.materials.reflection_coefficients import STEEP
+from simulator.materials.facet_reflection import STEEP
+from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
 
 CHAIN_ACCURACY = 1e-4

@@ -33,7 +33,7 @@ from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
-from simulator.materials.layered_media import Material
+from simulator.materials.fresnel_slab import Material
 from simulator.materials.reflection_table import reflection_table
 from simulator.multibounce.chain_count import Sees, chains_to, outline
 from simulator.multibounce.frequency_interpolation import (

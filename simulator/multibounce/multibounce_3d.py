@@ -28,7 +28,7 @@ from simulator.geometry.facets import Facets
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches, patch_side
 from simulator.geometry.ray_scene import blocked
-from simulator.materials.reflection_coefficients import reflection_nodes
+from simulator.materials.facet_reflection import reflection_nodes
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene

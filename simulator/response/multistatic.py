@@ -24,7 +24,7 @@ from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, surface_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
 from simulator.geometry.ray_scene import RayScene, build_scene, facets_visible
-from simulator.materials.layered_media import Absorber, Material
+from simulator.materials.fresnel_slab import Absorber, Material
 from simulator.scattering.bistatic_kernel import BistaticKernel, Port, pattern_table
 from simulator.scattering.physical_optics import scattered
 from simulator.scene.radio_scene import (

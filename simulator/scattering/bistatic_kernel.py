@@ -21,12 +21,12 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from scenes.realisations.object_surface import Surface
 from scenes.schema.antenna import Antenna, Isotropic
-from scenes.surfaces.roughness_spectrum import slope_share
+from scenes.surfaces.height_synthesis import slope_share
 from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.polarization import VERTICAL, Polarization, field_vector
 from simulator.geometry.facets import SMOOTHED, is_rough
-from simulator.materials.layered_media import Conductor, Material, reflection
-from simulator.materials.reflection_coefficients import Legs, mirror_shares
+from simulator.materials.facet_reflection import Legs, mirror_shares
+from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.scattering.triangle_transform import triangle_transform
 from simulator.scattering.weighted_curvature import (
     curvature_weight,

@@ -36,7 +36,7 @@ from scenes.schema.radio import Polarization
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets
 from simulator.geometry.profile_lines import Edge
-from simulator.materials.layered_media import Conductor, Material
+from simulator.materials.fresnel_slab import Conductor, Material
 from simulator.scattering.small_slope import kernels
 
 NUDGE = 1e-6

@@ -21,8 +21,8 @@ from scipy.constants import speed_of_light
 from estimator.compute import engine
 from simulator.antennas.polarization import VERTICAL, Polarization, field_vector
 from simulator.geometry.facets import Facets
-from simulator.materials.layered_media import Conductor, Material
-from simulator.materials.reflection_coefficients import Legs, conductor_mirror
+from simulator.materials.facet_reflection import Legs, conductor_mirror
+from simulator.materials.fresnel_slab import Conductor, Material
 from simulator.numerics.nufft_sum import FrequencySum
 from simulator.scattering.triangle_transform import triangle_transform
 from simulator.scattering.weighted_curvature import (

@@ -27,8 +27,8 @@ from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.links import Links
 from simulator.antennas.polarization import field_vector
 from simulator.geometry.patches import Patches
-from simulator.materials.layered_media import Conductor, Material, reflection
-from simulator.materials.reflection_coefficients import Legs, conductor_mirror, mirror_shares
+from simulator.materials.facet_reflection import Legs, conductor_mirror, mirror_shares
+from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
 from simulator.scattering.triangle_transform import triangle_transform
 from simulator.scattering.weighted_curvature import (

@@ -12,8 +12,8 @@ from estimator.compute.engine import thread_count
 from simulator.antennas.links import Links
 from simulator.geometry.facets import Facets
 from simulator.geometry.patches import Patches, cut_into_patches, patch_side
-from simulator.materials.layered_media import Absorber, Conductor, Material
-from simulator.materials.reflection_coefficients import echo_coefficient, reflection_nodes
+from simulator.materials.facet_reflection import echo_coefficient, reflection_nodes
+from simulator.materials.fresnel_slab import Absorber, Conductor, Material
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, lagrange_basis, nodes_needed
 from simulator.scattering.aperture_interpolation import GAIN, Aperture, find_aperture, node_counts
 from simulator.scattering.patch_kernel import PatchKernel

@@ -8,7 +8,7 @@ Between two antenna ports, a facet of size :math:`\Delta A` with reflection coef
 
 with the free-space links :math:`h = g\lambda/(4\pi r)\,e^{-jkr}` of both legs, antenna
 patterns :math:`g`, and the facet's edge :math:`e`; :math:`\Gamma` is that of
-:mod:`simulator.materials.reflection_coefficients`. The usual :math:`2\cos\theta_i` is not
+:mod:`simulator.materials.facet_reflection`. The usual :math:`2\cos\theta_i` is not
 reciprocal. For line facets, the integral along z is done by stationary phase, which gives
 the spherical wave of a scene that is invariant along z; the cylindrical wave is that of a
 unit line source :math:`G = -\tfrac{j}{4} H_0^{(2)}(kr)`, for comparison with
@@ -27,8 +27,7 @@ from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets, Group
-from simulator.materials.layered_media import Absorber, Conductor
-from simulator.materials.reflection_coefficients import (
+from simulator.materials.facet_reflection import (
     Legs,
     angle_class,
     echo_coefficient,
@@ -36,6 +35,7 @@ from simulator.materials.reflection_coefficients import (
     half_angle_cosine,
     reflection_nodes,
 )
+from simulator.materials.fresnel_slab import Absorber, Conductor
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
 from simulator.scattering.edge_diffraction import edge_echo, edge_view
 from simulator.scattering.rough_triangles import rough_weights

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from simulator.geometry.facets import Facets
-from simulator.materials.layered_media import Material
-from simulator.materials.reflection_coefficients import Legs
+from simulator.materials.facet_reflection import Legs
+from simulator.materials.fresnel_slab import Material
 from simulator.numerics.vectors import added, dot
 from simulator.scattering.weighted_curvature import curvature_weight, scattering_kernel
 

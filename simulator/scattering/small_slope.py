@@ -60,8 +60,8 @@ from jaxtyping import Complex, Complex64, Float, Int
 from scipy.constants import speed_of_light
 
 from scenes.schema.radio import Polarization
-from simulator.materials.layered_media import Dielectric, Material
-from simulator.materials.reflection_coefficients import over_angles
+from simulator.materials.facet_reflection import over_angles
+from simulator.materials.fresnel_slab import Dielectric, Material
 
 STEP = 0.01
 """Step of the direction's component along the line, over 1, between which fields of the filter are

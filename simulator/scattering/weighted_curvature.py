@@ -44,8 +44,8 @@ from typing import Any
 
 import numpy as np
 
-from simulator.materials.layered_media import Conductor, Dielectric, Material
-from simulator.materials.reflection_coefficients import Legs, conductor_mirror
+from simulator.materials.facet_reflection import Legs, conductor_mirror
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.numerics.vectors import added, at_least, cross, dot, scaled, square_root
 
 LEAST_LATERAL = 1e-8

@@ -20,14 +20,14 @@ from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, scene_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
 from simulator.geometry.ray_scene import RayScene, build_scene, facets_visible
-from simulator.materials.layered_media import Absorber, Dielectric, Material, named_material
+from simulator.materials.facet_reflection import reflection_nodes
+from simulator.materials.fresnel_slab import Absorber, Dielectric, Material, named_material
 from simulator.materials.permittivity import (
     ConstantPermittivity,
     MaterialError,
     Permittivity,
     read_permittivity,
 )
-from simulator.materials.reflection_coefficients import reflection_nodes
 from simulator.receiver.impairments import position_jitter
 from simulator.scene.array_antennas import array_group, in_space, needed_reach, sending_group
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors

@@ -16,7 +16,7 @@ from simulator.antennas.field_pattern import field_gain
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.ray_scene import RayScene, blocked, build_scene
-from simulator.materials.layered_media import Absorber
+from simulator.materials.fresnel_slab import Absorber
 from simulator.scene.radio_scene import scenario_materials
 from simulator.specular.image_method import Chain, find_chains
 

@@ -10,7 +10,7 @@ from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
-from simulator.materials.layered_media import Material
+from simulator.materials.fresnel_slab import Material
 from simulator.specular.image_sources import Leg, legs_within_reach
 
 LARGEST_TARGET = 0.5

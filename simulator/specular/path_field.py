@@ -18,7 +18,7 @@ from scipy.constants import speed_of_light
 from estimator.measurement.model import Waves
 from simulator.antennas.polarization import VERTICAL, Polarization
 from simulator.geometry.mirrors import Mirrors, dot
-from simulator.materials import layered_media
+from simulator.materials import fresnel_slab
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import Chain
 
@@ -93,7 +93,7 @@ def _field(
         within = np.cross(inward, across)
         te, tm = _project(field, vectors, across), _project(field, vectors, within)
         cosines = chain.cosines[some, bounce]
-        coefficients = layered_media.reflection(mirrors.materials[mirror], frequencies, cosines)
+        coefficients = fresnel_slab.reflection(mirrors.materials[mirror], frequencies, cosines)
         loss = roughness_loss(wavenumbers * mirrors.rms_heights[mirror] * cosines[:, None])
         field = [te * coefficients.te * loss, tm * coefficients.tm * loss]
         vectors = [across, np.cross(outward, across)]

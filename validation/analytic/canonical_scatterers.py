@@ -9,7 +9,7 @@ from scipy.special import hankel2, jv, spherical_jn, spherical_yn
 
 from scenes.realisations.object_surface import Surface
 from scenes.scenario import parse_scenario
-from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.height_synthesis import rough_sheet
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets, surface_facets

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.special import h2vp, hankel2, hankel2e, jv, jvp
 
-from simulator.materials.layered_media import slab
+from simulator.materials.fresnel_slab import slab
 from validation.full_wave.line_source import LineSource
 
 MORE_ORDERS = 40

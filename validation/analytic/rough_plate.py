@@ -38,8 +38,8 @@ from scenes.schema.objects import Plate
 from scenes.schema.roughness import Roughness
 from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.polarization import VERTICAL
-from simulator.materials.layered_media import Material
-from simulator.materials.reflection_coefficients import Legs, facet_coefficients
+from simulator.materials.facet_reflection import Legs, facet_coefficients
+from simulator.materials.fresnel_slab import Material
 from simulator.scattering.weighted_curvature import middle_permittivity, scattering_kernel
 
 TERMS = 30
@@ -76,7 +76,7 @@ def mean_diffuse_power(
     roughness
         Gaussian.
     material
-        Reflects as :mod:`simulator.materials.reflection_coefficients` says.
+        Reflects as :mod:`simulator.materials.facet_reflection` says.
     antennas
         Both ends.
     frequency

@@ -14,7 +14,7 @@ from scipy.constants import epsilon_0, speed_of_light
 from scipy.spatial.transform import Rotation
 
 from simulator.geometry.mirrors import Mirrors
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.specular.image_method import Blocked, find_chains
 from simulator.specular.path_field import reflected_field

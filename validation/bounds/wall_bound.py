@@ -29,7 +29,7 @@ from scipy.constants import speed_of_light
 from scenes.realisations.object_surface import plate_segment
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
-from simulator.materials.layered_media import Absorber
+from simulator.materials.fresnel_slab import Absorber
 from simulator.scene.radio_scene import scenario_materials
 from validation.bounds.no_bound import NoBound
 

@@ -11,7 +11,7 @@ from scenes.scenario import Scenario
 from scenes.schema.roughness import Roughness
 from simulator.geometry.facets import surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
-from simulator.materials.layered_media import Dielectric, reflection, transmission
+from simulator.materials.fresnel_slab import Dielectric, reflection, transmission
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.physical_optics import scattered
 from validation.analytic.canonical_scatterers import half_shadowed_plate, ports

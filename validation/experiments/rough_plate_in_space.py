@@ -25,13 +25,13 @@ from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface
 from scenes.schema.roughness import Roughness
-from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.height_synthesis import rough_sheet
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.links import Links
 from simulator.antennas.polarization import Polarization
 from simulator.geometry.facets import Facets, surface_facets
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.visibility.seen import Seen

@@ -20,7 +20,7 @@ from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.antenna import Antenna, GaussianBeam, Isotropic
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
-from simulator.materials.layered_media import Absorber, Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Absorber, Conductor, Dielectric, Material
 from simulator.scene.radio_scene import scenario_materials
 from validation.full_wave.boundary_equations import Body
 from validation.full_wave.conducting_contour import Contour, circle, closed_profile

@@ -21,7 +21,7 @@ from estimator.prediction.wall_reflection import (
 )
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
 from simulator.geometry.mirrors import Mirrors, line_mirrors
-from simulator.materials.layered_media import Conductor
+from simulator.materials.fresnel_slab import Conductor
 from simulator.specular.image_method import find_chains
 from validation.analytic.point_scatterer import point_echo, point_uplink
 

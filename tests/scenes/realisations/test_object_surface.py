@@ -11,8 +11,8 @@ from scenes.random_streams import random_stream
 from scenes.realisations.object_surface import Surface, object_surface, plate_segment
 from scenes.scenario import Plate, Roughness, Scenario, ScenarioError, parse_scenario
 from scenes.surfaces.facet_spacing import facet_count
+from scenes.surfaces.height_synthesis import rough_profile, rough_sheet
 from scenes.surfaces.heights import SAMPLES_PER_DETAIL, Heights
-from scenes.surfaces.roughness_spectrum import rough_profile, rough_sheet
 
 Table = dict[str, Any]
 

@@ -10,7 +10,7 @@ from scenes.realisations.object_surface import object_surface
 from scenes.scenario import ScenarioError, parse_scenario
 from scenes.schema.errors import ScenarioError as Refused
 from scenes.schema.height_map import read_height_map
-from scenes.surfaces.roughness_spectrum import rough_profile, rough_sheet, slope_share
+from scenes.surfaces.height_synthesis import rough_profile, rough_sheet, slope_share
 
 STEP, RMS, LENGTH = 2e-5, 1.5e-5, 3e-4
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from simulator.geometry.mirrors import Mirrors, line_mirrors
-from simulator.materials.layered_media import Conductor
+from simulator.materials.fresnel_slab import Conductor
 
 coordinates = st.floats(-2.0, 2.0, allow_subnormal=False)
 points = arrays(np.float64, (5, 3), elements=coordinates)

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import parse_scenario
-from scenes.surfaces.roughness_spectrum import rough_profile
+from scenes.surfaces.height_synthesis import rough_profile
 from simulator.geometry.facets import Facets, profile_surface, surface_facets
 from simulator.geometry.ray_scene import CLEARANCE, blocked, build_scene, facets_visible
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simulator.materials.layered_media import (
+from simulator.materials.fresnel_slab import (
     Conductor,
     Dielectric,
     Material,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from simulator.materials.layered_media import (
+from simulator.materials.fresnel_slab import (
     Absorber,
     Conductor,
     Dielectric,

@@ -15,7 +15,7 @@ from simulator.antennas.ports import Pattern, Ports
 from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, joined, profile_surface, surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
-from simulator.materials.layered_media import Dielectric
+from simulator.materials.fresnel_slab import Dielectric
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.multibounce.frequency_interpolation import CHAIN_ACCURACY, nodes_for_chain
 from simulator.multibounce.multibounce_2d import ghost_echo, uplink_over_surfaces

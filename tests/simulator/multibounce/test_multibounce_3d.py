@@ -12,7 +12,7 @@ from scenes.scenario import Scenario, parse_scenario
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.links import Links
-from simulator.materials.layered_media import Conductor
+from simulator.materials.fresnel_slab import Conductor
 from simulator.multibounce.multibounce_3d import coherent_echo, echo_over_mirrors
 from simulator.response.uplink import simulate_uplink
 from simulator.scattering.patch_sum import scattered_by_patches

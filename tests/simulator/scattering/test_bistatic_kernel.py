@@ -12,7 +12,7 @@ from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
 from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import surface_facets
-from simulator.materials.layered_media import (
+from simulator.materials.fresnel_slab import (
     Conductor,
     Dielectric,
     Material,

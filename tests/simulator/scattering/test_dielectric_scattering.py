@@ -13,7 +13,7 @@ from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, joined, profile_surface, surface_facets
 from simulator.geometry.mirrors import Mirrors
-from simulator.materials.layered_media import Absorber, Conductor, Dielectric, Material, reflection
+from simulator.materials.fresnel_slab import Absorber, Conductor, Dielectric, Material, reflection
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.physical_optics import scattered
 from simulator.simulation import simulate

@@ -8,11 +8,11 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from scenes.realisations.object_surface import Surface
-from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.height_synthesis import rough_sheet
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.ports import Pattern, Ports, isotropic
 from simulator.geometry.facets import Facets, joined, surface_facets
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering import physical_optics
 from simulator.scattering.physical_optics import facet_transform, scattered

@@ -8,13 +8,13 @@ from jaxtyping import Int
 
 from scenes.realisations.object_surface import Surface
 from scenes.schema.antenna import Antenna, Cosine, GaussianBeam, Horn, Isotropic
-from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.height_synthesis import rough_sheet
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.links import Links
 from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets, joined, surface_facets
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scattering.physical_optics import scattered

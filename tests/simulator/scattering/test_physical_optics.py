@@ -13,7 +13,7 @@ from scipy.special import hankel2
 
 from estimator.measurement.model import Waves
 from scenes.realisations.object_surface import Surface
-from scenes.surfaces.roughness_spectrum import rough_profile
+from scenes.surfaces.height_synthesis import rough_profile
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.ports import Pattern, Ports
 from simulator.geometry.facets import Facets, profile_surface, surface_facets

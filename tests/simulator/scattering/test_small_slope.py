@@ -5,7 +5,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from scenes.schema.radio import Polarization
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.scattering.small_slope import RoughLine, echo_weights, kernels
 

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from jaxtyping import Float
 
 from scenes.realisations.object_surface import Surface
-from scenes.surfaces.roughness_spectrum import rough_sheet
+from scenes.surfaces.height_synthesis import rough_sheet
 from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.antenna_pattern import ISOTROPIC
 from simulator.antennas.links import Links
 from simulator.antennas.polarization import VERTICAL, Polarization, field_vector
 from simulator.antennas.ports import Ports, isotropic
 from simulator.geometry.facets import Facets, surface_facets
-from simulator.materials.layered_media import Conductor, Dielectric, Material
+from simulator.materials.facet_reflection import Legs, conductor_mirror
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
-from simulator.materials.reflection_coefficients import Legs, conductor_mirror
 from simulator.scattering import physical_optics
 from simulator.scattering.bistatic_kernel import BistaticKernel, Port
 from simulator.scattering.patch_sum import scattered_by_patches

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from simulator.geometry.mirrors import Mirrors, line_mirrors
-from simulator.materials.layered_media import Conductor
+from simulator.materials.fresnel_slab import Conductor
 from simulator.specular import image_method
 from simulator.specular.image_method import Chain, find_chains
 

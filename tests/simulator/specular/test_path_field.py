@@ -10,8 +10,8 @@ from scipy.special import hankel2
 
 from simulator.antennas.polarization import Polarization
 from simulator.geometry.mirrors import Mirrors
-from simulator.materials import layered_media
-from simulator.materials.layered_media import Absorber, Conductor, Dielectric, Material
+from simulator.materials import fresnel_slab
+from simulator.materials.fresnel_slab import Absorber, Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
 from simulator.specular import path_field
 from simulator.specular.free_space import direct_wave
@@ -87,7 +87,7 @@ def test_a_conducting_wall_turns_a_vertical_field_round() -> None:
 def test_a_wall_reflects_a_vertical_field_as_te_at_every_frequency() -> None:
     wall = plane([0.0, 1.0, 0.0], GYPSUM)
     field = reflected(wall, [-0.5, 0.5, 0.0], [0.5, 0.5, 0.0])
-    te, _ = layered_media.reflection(GYPSUM, FREQUENCIES, np.array([np.cos(np.pi / 4)]))
+    te, _ = fresnel_slab.reflection(GYPSUM, FREQUENCIES, np.array([np.cos(np.pi / 4)]))
     np.testing.assert_allclose(field, te[0], rtol=1e-12)
     assert np.ptp(np.abs(field)) > 0.05  # the slab's ripple is in it
 
@@ -95,7 +95,7 @@ def test_a_wall_reflects_a_vertical_field_as_te_at_every_frequency() -> None:
 def test_a_floor_reflects_a_vertical_field_as_tm() -> None:
     floor = plane([0.0, 0.0, 1.0], GYPSUM)
     field = reflected(floor, [-1.0, 0.0, 0.5], [1.0, 0.0, 0.5])
-    _, tm = layered_media.reflection(GYPSUM, FREQUENCIES, np.array([1 / np.sqrt(5)]))
+    _, tm = fresnel_slab.reflection(GYPSUM, FREQUENCIES, np.array([1 / np.sqrt(5)]))
     np.testing.assert_allclose(field, tm[0], rtol=1e-12)
 
 

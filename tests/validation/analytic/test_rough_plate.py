@@ -11,7 +11,7 @@ from scenes.scenario import Scenario, parse_scenario
 from scenes.schema.objects import Plate
 from scenes.schema.roughness import Roughness
 from simulator.antennas.field_pattern import horn_beam_width
-from simulator.materials.layered_media import Conductor
+from simulator.materials.fresnel_slab import Conductor
 from simulator.scene.radio_scene import scenario_materials
 from simulator.simulation import simulate
 from validation.analytic.rough_plate import coherent_loss, mean_diffuse_power, mirror_link

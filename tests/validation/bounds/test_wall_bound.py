@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenes.files.loading import load_scenario
-from scenes.surfaces.roughness_spectrum import rough_profile
+from scenes.surfaces.height_synthesis import rough_profile
 from validation.bounds.wall_bound import (
     line_covariance,
     noise_depth_deviation,

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.special import erfc, j0
 from scipy.stats import kstest
 
-from scenes.surfaces.roughness_spectrum import rough_profile, rough_sheet
+from scenes.surfaces.height_synthesis import rough_profile, rough_sheet
 
 RMS, LENGTH, CUTOFF = 0.05e-3, 0.3e-3, 0.03e-3
 STANDARD_ERRORS = 4.5

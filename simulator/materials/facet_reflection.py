@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from scenes.schema.radio import Polarization as Polarization2D
-from simulator.materials.layered_media import Coefficients, Conductor, Material, reflection
+from simulator.materials.fresnel_slab import Coefficients, Conductor, Material, reflection
 from simulator.materials.permittivity import MaterialError
 from simulator.numerics.nufft_sum import ACCURACY, barycentric_basis, chebyshev_nodes
 from simulator.numerics.vectors import Vector, at_least, cross, dot

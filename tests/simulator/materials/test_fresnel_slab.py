@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from scipy.constants import speed_of_light
 from scipy.integrate import solve_ivp
 
-from simulator.materials import layered_media
-from simulator.materials.layered_media import Absorber, Conductor, Dielectric
+from simulator.materials import fresnel_slab
+from simulator.materials.fresnel_slab import Absorber, Conductor, Dielectric
 from simulator.materials.permittivity import ConstantPermittivity, MaterialError
 
 FREQUENCIES = np.linspace(220e9, 330e9, 1101)
@@ -23,15 +23,15 @@ def dielectric(value: complex, thickness: float) -> Dielectric:
 
 
 def test_a_conductor_reflects_all_and_turns_the_field_across_the_plane_of_incidence() -> None:
-    te, tm = layered_media.reflection(Conductor(), FREQUENCIES, COSINES)
+    te, tm = fresnel_slab.reflection(Conductor(), FREQUENCIES, COSINES)
     np.testing.assert_array_equal(te, -1)
     np.testing.assert_array_equal(tm, 1)
-    for coefficient in layered_media.transmission(Conductor(), FREQUENCIES, COSINES):
+    for coefficient in fresnel_slab.transmission(Conductor(), FREQUENCIES, COSINES):
         np.testing.assert_array_equal(coefficient, 0)
 
 
 def test_an_absorber_returns_nothing_and_lets_nothing_through() -> None:
-    for function in (layered_media.reflection, layered_media.transmission):
+    for function in (fresnel_slab.reflection, fresnel_slab.transmission):
         for coefficient in function(Absorber(), FREQUENCIES, COSINES):
             assert coefficient.shape == (5, 1101)
             np.testing.assert_array_equal(coefficient, 0)
@@ -39,14 +39,14 @@ def test_an_absorber_returns_nothing_and_lets_nothing_through() -> None:
 
 def test_a_dielectric_of_huge_loss_becomes_a_conductor() -> None:
     # |1 + r| ~ 2 cos / sqrt(eps) for TE, 2 / (cos sqrt(eps)) for TM, cos >= 0.08 here.
-    te, tm = layered_media.reflection(dielectric(1.0 - 1e12j, np.inf), FREQUENCIES, COSINES)
+    te, tm = fresnel_slab.reflection(dielectric(1.0 - 1e12j, np.inf), FREQUENCIES, COSINES)
     np.testing.assert_allclose(te, -1, atol=2e-6)
     np.testing.assert_allclose(tm, 1, atol=2.0 / 0.087 * 1e-6)
 
 
 def test_a_lossless_slab_ripples_as_the_airy_formula_says() -> None:
     index, thickness, angle = 1.6, 12.7e-3, np.deg2rad(30)
-    te, _ = layered_media.reflection(
+    te, _ = fresnel_slab.reflection(
         dielectric(index**2, thickness), FREQUENCIES, np.array([np.cos(angle)])
     )
     inner = np.sqrt(index**2 - np.sin(angle) ** 2)
@@ -61,7 +61,7 @@ def test_the_ripple_of_a_slab_repeats_every_c_over_twice_its_optical_thickness()
     index, thickness = 1.6, 2e-3
     period = speed_of_light / (2 * index * thickness)
     frequencies = 250e9 + period * np.array([0.0, 0.3, 0.5, 1.0, 1.3, 1.5])
-    for coefficient in layered_media.reflection(
+    for coefficient in fresnel_slab.reflection(
         dielectric(index**2, thickness), frequencies, np.ones(1)
     ):
         np.testing.assert_allclose(coefficient[0, :3], coefficient[0, 3:], rtol=1e-9)
@@ -72,7 +72,7 @@ def test_nothing_of_the_field_within_the_plane_is_reflected_at_brewsters_angle()
     value = 2.56
     cosine = np.cos(np.arctan(np.sqrt(value)))
     for thickness in (1e-3, np.inf):
-        te, tm = layered_media.reflection(
+        te, tm = fresnel_slab.reflection(
             dielectric(value, thickness), FREQUENCIES[500:501], np.array([cosine])
         )
         assert abs(tm[0, 0]) < 1e-14
@@ -80,8 +80,8 @@ def test_nothing_of_the_field_within_the_plane_is_reflected_at_brewsters_angle()
 
 
 def test_gypsum_at_45_degrees_reflects_horizontal_fields_twice_as_faintly_in_decibels() -> None:
-    drywall = layered_media.named_material("drywall", FREQUENCIES)
-    te, tm = layered_media.reflection(drywall, FREQUENCIES, np.cos([np.pi / 4]))
+    drywall = fresnel_slab.named_material("drywall", FREQUENCIES)
+    te, tm = fresnel_slab.reflection(drywall, FREQUENCIES, np.cos([np.pi / 4]))
     # Rounded to 0.1 dB, for a lossless half space; loss and the far face add 0.05 dB.
     np.testing.assert_allclose(10 * np.log10(power(te)), -9.4, atol=0.1)
     np.testing.assert_allclose(10 * np.log10(power(tm)), -18.7, atol=0.1)
@@ -90,8 +90,8 @@ def test_gypsum_at_45_degrees_reflects_horizontal_fields_twice_as_faintly_in_dec
 
 
 def test_drywall_swallows_what_enters_it() -> None:
-    drywall = layered_media.named_material("drywall", np.array([275e9]))
-    te, _ = layered_media.transmission(drywall, np.array([275e9]), np.ones(1))
+    drywall = fresnel_slab.named_material("drywall", np.array([275e9]))
+    te, _ = fresnel_slab.transmission(drywall, np.array([275e9]), np.ones(1))
     loss_per_cm = -10 * np.log10(power(te[0, 0])) / 1.27
     assert 18 < loss_per_cm < 24  # 'some 20 dB/cm' and 0.5 dB for both faces
 
@@ -151,8 +151,8 @@ def test_what_a_slab_neither_reflects_nor_transmits_is_absorbed_inside_it(
     polarization = 0 if electric else 1
     slab = dielectric(value, thickness)
     arguments = (slab, np.array([frequency]), np.array([cosine]))
-    r = layered_media.reflection(*arguments)[polarization][0, 0]
-    t = layered_media.transmission(*arguments)[polarization][0, 0]
+    r = fresnel_slab.reflection(*arguments)[polarization][0, 0]
+    t = fresnel_slab.transmission(*arguments)[polarization][0, 0]
     assert power(r) + power(t) + absorbed == pytest.approx(1.0, abs=1e-8)  # of the integration
     # The magnetic field's own coefficient is that of the TM field in the signs used here.
     assert r == pytest.approx(reflected, abs=1e-8)
@@ -160,38 +160,36 @@ def test_what_a_slab_neither_reflects_nor_transmits_is_absorbed_inside_it(
 
 
 def test_an_infinitely_thick_slab_is_the_limit_of_thick_ones() -> None:
-    thick = layered_media.reflection(dielectric(2.0 - 0.1j, 0.2), FREQUENCIES, COSINES)
-    opaque = layered_media.reflection(dielectric(2.0 - 0.1j, np.inf), FREQUENCIES, COSINES)
+    thick = fresnel_slab.reflection(dielectric(2.0 - 0.1j, 0.2), FREQUENCIES, COSINES)
+    opaque = fresnel_slab.reflection(dielectric(2.0 - 0.1j, np.inf), FREQUENCIES, COSINES)
     np.testing.assert_allclose(thick, opaque, atol=1e-14)  # 0.4 m at 140 Np/m and more
 
 
 def test_a_vanishing_slab_is_not_there() -> None:
     arguments = (dielectric(3.0 - 0.1j, 1e-12), FREQUENCIES, COSINES)
     # Reflection is of the order k d (ε - 1) / cos.
-    np.testing.assert_allclose(
-        layered_media.reflection(*arguments), 0, atol=7e3 * 1e-12 * 2 / 0.087
-    )
-    np.testing.assert_allclose(layered_media.transmission(*arguments), 1, atol=1e-6)
+    np.testing.assert_allclose(fresnel_slab.reflection(*arguments), 0, atol=7e3 * 1e-12 * 2 / 0.087)
+    np.testing.assert_allclose(fresnel_slab.transmission(*arguments), 1, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["metal", "absorber", "drywall", "cardboard", "concrete", "wood"])
 def test_every_named_material_is_passive_over_the_band(name: str) -> None:
-    material = layered_media.named_material(name, FREQUENCIES)
-    reflected = layered_media.reflection(material, FREQUENCIES, COSINES)
-    transmitted = layered_media.transmission(material, FREQUENCIES, COSINES)
+    material = fresnel_slab.named_material(name, FREQUENCIES)
+    reflected = fresnel_slab.reflection(material, FREQUENCIES, COSINES)
+    transmitted = fresnel_slab.transmission(material, FREQUENCIES, COSINES)
     for r, t in zip(reflected, transmitted, strict=True):
         assert np.all(power(r) + power(t) <= 1 + 1e-12)
 
 
 def test_a_thickness_of_ones_own_replaces_the_default() -> None:
-    material = layered_media.named_material("glass", np.array([60e9]), thickness=6e-3)
+    material = fresnel_slab.named_material("glass", np.array([60e9]), thickness=6e-3)
     assert isinstance(material, Dielectric)
     assert material.thickness == 6e-3
 
 
 def test_an_unknown_material_is_refused_with_the_known_ones() -> None:
     with pytest.raises(MaterialError, match="unknown material 'cheese'; known: metal, absorber"):
-        layered_media.named_material("cheese", FREQUENCIES)
+        fresnel_slab.named_material("cheese", FREQUENCIES)
 
 
 def test_a_slab_without_thickness_is_refused() -> None:

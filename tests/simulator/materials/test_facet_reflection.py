@@ -8,14 +8,8 @@ from jaxtyping import Float
 
 from scenes.schema.materials import MATERIALS
 from simulator.antennas.polarization import VERTICAL, Polarization
-from simulator.materials import layered_media
-from simulator.materials.layered_media import Conductor, Dielectric, named_material
-from simulator.materials.permittivity import (
-    ConstantPermittivity,
-    MaterialError,
-    TabulatedPermittivity,
-)
-from simulator.materials.reflection_coefficients import (
+from simulator.materials import fresnel_slab
+from simulator.materials.facet_reflection import (
     Legs,
     Shares,
     angle_class,
@@ -24,6 +18,12 @@ from simulator.materials.reflection_coefficients import (
     half_angle_cosine,
     mirror_shares,
     reflection_nodes,
+)
+from simulator.materials.fresnel_slab import Conductor, Dielectric, named_material
+from simulator.materials.permittivity import (
+    ConstantPermittivity,
+    MaterialError,
+    TabulatedPermittivity,
 )
 from simulator.numerics.nufft_sum import ACCURACY, chebyshev_nodes, lagrange_basis
 
@@ -49,7 +49,7 @@ def vertical_shares(transmit: np.ndarray, receive: np.ndarray) -> Shares:
 
 
 def test_scenarios_and_the_simulator_know_the_same_names() -> None:
-    assert set(MATERIALS) == {"metal", "absorber", *layered_media.THICKNESS}
+    assert set(MATERIALS) == {"metal", "absorber", *fresnel_slab.THICKNESS}
     for name in set(MATERIALS) - {"chipboard"}:  # whose last row ends at 200 GHz
         named_material(name, BAND)
 
@@ -167,7 +167,7 @@ def test_many_angles_are_interpolated_to_the_accuracy_of_the_sum() -> None:
     transmit = np.stack([np.sin(angles), np.cos(angles), 0 * angles], axis=-1)
     receive = transmit * [-1, 1, 1]
     values = facet_coefficients(PANE, transmit, receive, BAND, fields=None)
-    exact = layered_media.reflection(PANE, BAND, np.cos(angles)).te.T
+    exact = fresnel_slab.reflection(PANE, BAND, np.cos(angles)).te.T
     error = np.abs(values - exact).max()
     assert error <= 3 * ACCURACY  # it is tried out halfway between the nodes only
     assert error > 0  # it is not the same sum
@@ -187,8 +187,8 @@ def test_the_nodes_follow_a_slabs_ripple(slab: Dielectric) -> None:
     rng = np.random.default_rng(1)
     frequencies, cosines = rng.uniform(220e9, 330e9, 300), rng.uniform(0.1, 1.0, 40)
     basis = lagrange_basis(nodes, frequencies)
-    sampled = layered_media.reflection(slab, nodes, cosines)
-    exact = layered_media.reflection(slab, frequencies, cosines)
+    sampled = fresnel_slab.reflection(slab, nodes, cosines)
+    exact = fresnel_slab.reflection(slab, frequencies, cosines)
     for part, true in zip(sampled, exact, strict=True):
         # Angles between those that were tried add some.
         assert np.abs(part @ basis - true).max() <= 3 * ACCURACY
