@@ -88,11 +88,12 @@ def test_a_mirror_of_a_dielectric_reflects_its_coefficient_at_the_specular_angle
 
 
 def test_an_echo_is_that_of_a_conductor_times_the_coefficient_at_normal_incidence() -> None:
-    array = np.array([[-0.1, -0.3, 0.0], [0.05, -0.35, 0.0]])
+    array = np.array([[-0.1, -0.3, 0.0]])
     echoes = []
     for material in (PANE, Conductor()):
         facets = wall(material)
-        port = ports(array, facets, 0.3)
+        # The window ends where the wall does: the conductor's fringe currents are dark.
+        port = ports(array, facets, 0.2)
         echoes.append(scattered(facets, port, port, BAND, waves="spherical"))
     expected = -echoes[1] * reflection(PANE, BAND, np.ones(1)).te[0]
     np.testing.assert_allclose(echoes[0], expected, rtol=1e-12)
@@ -168,14 +169,18 @@ def scenario(**changes: Any) -> Scenario:
     )
 
 
-def test_a_scenario_of_a_slab_echoes_by_its_coefficient() -> None:
-    echoes = []
-    for material in ({"permittivity": [2.5, 0.05], "thickness_mm": 1.5}, "metal"):
+def test_scenarios_of_slabs_echo_by_their_coefficients() -> None:
+    # Two dielectrics: neither has fringe currents at its edges, which a conductor has.
+    echoes, coefficients = [], []
+    for permittivity in (2.5 - 0.05j, 6.0 - 0.3j):
+        material = {"permittivity": [permittivity.real, -permittivity.imag], "thickness_mm": 1.5}
         found = simulate(scenario(plate={"material": material}), seed=0).measurement.echo
         assert found is not None
         echoes.append(found.samples)
-    ratio = reflection(PANE, np.linspace(220e9, 295e9, 31), np.ones(1)).te[0]
-    np.testing.assert_allclose(echoes[0], -echoes[1] * ratio, rtol=1e-9)
+        slab = Dielectric(permittivity=ConstantPermittivity(value=permittivity), thickness=1.5e-3)
+        coefficients.append(reflection(slab, np.linspace(220e9, 295e9, 31), np.ones(1)).te[0])
+    ratio = coefficients[1] / coefficients[0]
+    np.testing.assert_allclose(echoes[1], echoes[0] * ratio, rtol=1e-9)
 
 
 def test_a_table_of_permittivity_is_read_for_the_simulation(tmp_path: Any) -> None:
