@@ -380,9 +380,16 @@ def normal_component(
 
 
 def extended(heights: Float[np.ndarray, " n"], step: float) -> Float[np.ndarray, " more"]:
-    """Let an open line's heights go on, turned about its ends, and fade; periodic then. [m]."""
+    """Let an open line's heights go on, turned about its ends, and fade; periodic then. [m].
+
+    Heights are those of facets' centres, so the line ends half a step beyond the last. Turned about
+    that end it goes on without a kink. Turned about the last centre it repeats that height: the
+    echo's error then falls with the spacing, not with its square.
+    """
     count = min(int(REACH / step), heights.size - 1)
     fade = 0.5 * (1 + np.cos(np.pi * (np.arange(count) + 0.5) / count))
-    after = (2 * heights[-1] - heights[-1 : -count - 1 : -1]) * fade
-    before = (2 * heights[0] - heights[:count]) * fade
+    last = 1.5 * heights[-1] - 0.5 * heights[-2]
+    first = 1.5 * heights[0] - 0.5 * heights[1]
+    after = (2 * last - heights[-1 : -count - 1 : -1]) * fade
+    before = (2 * first - heights[:count]) * fade
     return np.concatenate([heights, after, before[::-1]])

@@ -7,7 +7,7 @@ from scipy.constants import speed_of_light
 from scenes.schema.radio import Polarization
 from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
-from simulator.scattering.small_slope import RoughLine, echo_weights, kernels
+from simulator.scattering.small_slope import RoughLine, echo_weights, extended, kernels
 
 FREQUENCY = 260e9
 WAVELENGTH = speed_of_light / FREQUENCY
@@ -139,3 +139,14 @@ def test_the_grid_of_directions_gives_what_each_direction_gives() -> None:
     found = echo_weights(rough, side=1.0)(np.full(some.size, 0.4137), some)
     exact = rough.weights(ways(0.4137), ways(0.4137), side=1.0, monostatic=True)[:, some]
     assert np.linalg.norm(found - exact) < 2e-3 * np.linalg.norm(exact)
+
+
+def test_a_line_goes_on_beyond_its_ends_without_a_kink() -> None:
+    # Facets' centres on a straight slope that ends at height 0: beyond, it is that slope still.
+    step, slope = 1e-5, 0.2
+    heights = slope * step * (np.arange(400) - 399.5)
+    after = extended(heights, step)[395:405]
+    before = np.roll(extended(heights[::-1], step), 5)[:10]
+    for joint in (after, before[::-1]):
+        # The fade over 10 mm takes (π/2 · 5/400)² of the last heights: less than 0.1 %.
+        np.testing.assert_allclose(np.diff(joint), slope * step, rtol=1e-3)
