@@ -23,7 +23,8 @@ _SYMBOLS = {
 }  # fmt: skip
 _OPERATORS = {
     "cdot": "⋅", "times": "×", "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "ne": "≠", "ll": "≪",
-    "gg": "≫", "approx": "≈", "sim": "∼", "pm": "±", "mp": "∓", "to": "→", "in": "∈", "propto": "∝",
+    "gg": "≫", "approx": "≈", "sim": "∼", "pm": "±", "mp": "∓", "to": "→",
+    "leftrightarrow": "↔", "in": "∈", "propto": "∝",
     "parallel": "∥", "perp": "⟂", "nabla": "∇", "equiv": "≡", "mid": "|", "circ": "∘",
 }  # fmt: skip
 _FENCES = {

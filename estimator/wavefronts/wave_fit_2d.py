@@ -336,7 +336,10 @@ def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) 
     scaled = normal * np.outer(scale, scale)
     if len(starts) > 1 and np.linalg.cond(scaled) > MOST_CONDITION:
         raise NoWaveError("two waves became one")
-    inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
+    try:
+        inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
+    except np.linalg.LinAlgError as error:  # two or three elements, or frequencies
+        raise NoWaveError("the samples do not tell the wave's parameters apart") from error
     return inverse
 
 

@@ -71,7 +71,9 @@ def rough_sources(
     shape = sent[0].shape
     columns, values = [], []
     for share in (-1.0, 0.0, 1.0):
-        out = np.clip(centre + share * margin, -MOST_OBLIQUE, MOST_OBLIQUE + LEAST_SPAN)
+        # Also where the middle is at a limit, the three angles differ.
+        limit = MOST_OBLIQUE + LEAST_SPAN
+        out = np.clip(centre + share * margin, -limit, limit)
         receive = np.broadcast_to(np.sin(out), shape), np.broadcast_to(np.cos(out), shape)
         columns.append(np.stack([np.ones_like(out), np.sin(out), np.cos(out)], axis=-1))
         pair = [(t.ravel(), q.ravel()) for t, q in (sent, receive)]

@@ -145,7 +145,7 @@ def test_ctrl_c_in_the_middle_of_a_run_leaves_nothing_behind(tmp_path: Path) -> 
         text=True,
     )
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("a/.out-*")):  # the folder that it writes aside
+    while not list(tmp_path.glob("a/.out.mmslam")):  # the folder that it writes aside
         assert child.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -302,7 +302,7 @@ REFUSED: list[tuple[Table, str]] = [
     ),
     (
         {"objects__wall__roughness": {"rms_mm": 1, "correlation_mm": 0}},
-        r"^objects\.wall\.roughness\.correlation_mm = 0: must be greater than 0",
+        r"^objects\.wall\.roughness\.correlation_mm = 0: must be greater than or equal to 0\.0000",
     ),
     (
         {"objects__wall__roughness": {"rms_mm": 1}},

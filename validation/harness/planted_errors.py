@@ -110,7 +110,7 @@ PLANTED = (
     PlantedError(
         name="rough walls hide themselves",
         file="simulator/scene/radio_scene.py",
-        right="rays=build_scene(surfaces, mean=scenario.dimensions == 2)",
+        right="rays=build_scene(surfaces, mean=True)",
         wrong="rays=build_scene(surfaces, mean=False)",
         claims=("full_wave_roughness",),
     ),

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import mitsuba as mi
@@ -7,10 +8,11 @@ import sionna.rt as rt
 
 from scenes.files.loading import load_scenario
 from scenes.meshes.ply_writer import ply_bytes
+from scenes.realisations.object_surface import object_surface
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.export.scene_files import MOST_FROZEN, exported_files, frozen_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
-from simulator.geometry.ray_scene import facets_visible
+from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.materials.sionna_materials import scattering_coefficient
 from simulator.scene.radio_scene import radio_scene
 from simulator.simulation import simulate
@@ -54,25 +56,26 @@ def solid() -> Scenario:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("make", [small_slam_2d, solid], ids=["2-D", "3-D"])
-def test_an_exported_scene_has_the_same_facets_visibility_and_signals(
-    make: object, tmp_path: Path
+@pytest.mark.parametrize(
+    ("make", "correlation", "level_db"), [(small_slam_2d, 0.97, 4.0), (solid, 0.999, 0.1)]
+)
+def test_an_exported_scene_is_the_same_surface_without_its_mean(
+    make: Callable[[], Scenario], correlation: float, level_db: float, tmp_path: Path
 ) -> None:
-    scenario: Scenario = make()  # type: ignore[operator]
+    scenario = make()
     exported(scenario, tmp_path, seed=3)
     again = load_scenario(str(tmp_path / f"{scenario.name}_facets.toml"))
     ours, theirs = (radio_scene(scene, seed=3, sample=0) for scene in (scenario, again))
     assert ours.facets is not None
     assert theirs.facets is not None
-    # PLY in double precision loses nothing; the mesh reader merges vertices closer than 10 nm,
-    # and there are none.
-    np.testing.assert_allclose(theirs.facets.centres, ours.facets.centres, rtol=0, atol=1e-15)
+    # A rough line's facets stand on its mean, not between vertices: height times slope apart.
+    np.testing.assert_allclose(theirs.facets.centres, ours.facets.centres, rtol=0, atol=3e-6)
     np.testing.assert_array_equal(theirs.facets.two_sided, ours.facets.two_sided)
     points = scenario.base_station.element_positions
-    np.testing.assert_array_equal(
-        facets_visible(theirs.rays, theirs.facets, points),
-        facets_visible(ours.rays, ours.facets, points),
-    )
+    seen = [facets_visible(one.rays, one.facets, points) for one in (ours, theirs)]  # type: ignore[arg-type]
+    assert np.mean(seen[0] != seen[1]) < 0.02  # rays meet the mean surface of the one only
+    # Facets whose mean is not known scatter as tangent planes: a short-waved line at 45° is then
+    # 3.8 dB brighter (Bragg), bodies in space hardly differ.
     first, second = (simulate(scene, seed=3).measurement for scene in (scenario, again))
     assert first.echo is not None
     assert second.echo is not None
@@ -82,8 +85,9 @@ def test_an_exported_scene_has_the_same_facets_visibility_and_signals(
         for one, other in zip(first.uplinks, second.uplinks, strict=True)
     ]
     for one, other in pairs:
-        # Rounding of 1e-16 m over a wavelength of 1 mm, and of the sums.
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-11 * np.abs(one).max())
+        sizes = np.linalg.norm(one), np.linalg.norm(other)
+        assert abs(np.vdot(one, other)) >= correlation * sizes[0] * sizes[1]
+        assert abs(20 * np.log10(sizes[1] / sizes[0])) <= level_db
 
 
 def test_sionna_opens_the_smooth_scene_with_its_radio_materials(tmp_path: Path) -> None:
@@ -102,7 +106,7 @@ def test_sionna_opens_the_smooth_scene_with_its_radio_materials(tmp_path: Path) 
 def test_mitsuba_reads_the_facets_to_single_precision(tmp_path: Path) -> None:
     scenario = solid()
     exported(scenario, tmp_path)
-    ours = radio_scene(scenario, seed=0, sample=0).rays
+    ours = build_scene([object_surface(scenario, "post", seed=0)])
     scene = rt.load_scene(str(tmp_path / "solid_facets.xml"), merge_shapes=False)
     theirs = scene.objects["post"].mi_mesh
     mesh, centre = ours.objects["post"].mi_mesh, ours.centre

@@ -36,7 +36,8 @@ def test_chains_delays_and_coefficients_are_those_of_the_path_solver(seed: int) 
 def test_occlusion_by_mitsuba_leaves_the_same_paths(seed: int) -> None:
     scene = random_scene(seed)
     theirs, _ = solver_scene(scene)
-    exact, traced = our_paths(scene), our_paths(scene, partial(ray_scene.blocked, theirs))
+    rays = ray_scene.RayScene(scene=theirs, centre=np.zeros(3), clearance=ray_scene.CLEARANCE)
+    exact, traced = our_paths(scene), our_paths(scene, partial(ray_scene.blocked, rays))
     for key in exact.keys() ^ traced.keys():
         path = exact[key] if key in exact else traced[key]
         assert distance_from_edges(path, scene.corners) < EDGE

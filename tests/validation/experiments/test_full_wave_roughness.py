@@ -105,7 +105,7 @@ def test_the_map_shows_each_number_and_outlines_what_is_trusted(tmp_path: Path) 
     assert {text.get_text() for text in panel.texts} == {"0.994", "0.912"}
     assert len(panel.patches) == 1
     levels = {text.get_text() for text in figure.axes[3].texts}
-    assert levels == {"+1.0", "+4.9"}
+    assert levels == {"+0.4", "+4.9"}
     plt.close(figure)
     write_numbers(tmp_path / "map.csv", (GOOD, other))
     lines = (tmp_path / "map.csv").read_text().splitlines()
