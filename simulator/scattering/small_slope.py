@@ -386,7 +386,7 @@ def extended(heights: Float[np.ndarray, " n"], step: float) -> Float[np.ndarray,
     that end it goes on without a kink. Turned about the last centre it repeats that height: the
     echo's error then falls with the spacing, not with its square.
     """
-    count = min(int(REACH / step), heights.size - 1)
+    count = min(round(REACH / step), heights.size - 1)
     fade = 0.5 * (1 + np.cos(np.pi * (np.arange(count) + 0.5) / count))
     last = 1.5 * heights[-1] - 0.5 * heights[-2]
     first = 1.5 * heights[0] - 0.5 * heights[1]

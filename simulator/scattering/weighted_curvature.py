@@ -5,9 +5,9 @@ With unit vectors :math:`\hat u` from a facet to the two antennas, their fields'
 :math:`\hat n` and the slope :math:`\nabla h` (so that :math:`\mathbf N = \hat n - \nabla h` is
 along the facet's normal), the scattering kernels in units of the tangent plane's are
 
-.. math:: K &= \tfrac12 |\mathbf q|^2\, \Gamma(\hat e_t, \hat e_r) \\
-          B &= -\tfrac12 (\varepsilon - 1) (\mathbf E_t \cdot \mathbf E_r
-               + D_t D_r / \varepsilon)
+.. math:: K = \tfrac12 |\mathbf q|^2\, \Gamma(\hat e_t, \hat e_r)
+
+.. math:: B = -\tfrac12 (\varepsilon - 1) (\mathbf E_t \cdot \mathbf E_r + D_t D_r / \varepsilon)
 
 K is the tangent plane's at its stationary point, :math:`\Gamma` the Fresnel coefficients at half
 the angle between the legs; B is first-order small perturbations' (Rice 1951), here as Hadamard's

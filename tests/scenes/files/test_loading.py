@@ -195,8 +195,8 @@ BAD_OVERRIDES = [
     ("objects=3", r"^slam_2d: objects = 3: must be a table"),
     (
         "users.user.antenna.kind=isotropic",
-        r"antenna\.sigma_rad: unknown key; known for kind 'isotropic': polarization, cross_polar_db, "
-        r"kind; to change the kind, r",
+        r"antenna\.sigma_rad: unknown key; known for kind 'isotropic': polarization, "
+        r"cross_polar_db, kind; to change the kind, r",
     ),
 ]
 
