@@ -21,7 +21,7 @@ facet's tangent-plane weight :math:`\Gamma (\hat n_f \cdot \mathbf q)\, dA` then
 .. math:: -2 \Bigl[F(\hat n) \frac{\mathbf q_\parallel \cdot \nabla h}{q_\parallel^2}
           + \frac{g}{q_z} F(\mathbf q / q_z + \nabla h) \Bigr]\, \hat n \cdot \hat n_f\, dA
 
-the weighted curvature approximation [1]_ [2]_, in a form that leaves a flat surface as it is:
+the weighted curvature approximation [1]_, [2]_, in a form that leaves a flat surface as it is:
 the first term is B - K after an integration by parts, the second the curvature's. To first order
 in the heights the sum is B exactly, and a facet that mirrors one antenna into the other weighs
 what the tangent plane says.
