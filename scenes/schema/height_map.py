@@ -136,8 +136,13 @@ def _csv(path: Path) -> tuple[np.ndarray, float | None]:
     try:
         with path.open(encoding="utf-8") as lines:
             head = lines.readline()
-        named = any(sign.isalpha() for sign in head.replace("e", "").replace("E", ""))
-        values = np.loadtxt(path, delimiter=",", skiprows=1 if named else 0, ndmin=2)
+            named = any(sign.isalpha() for sign in head.replace("e", "").replace("E", ""))
+            rows = [line for line in ([] if named else [head]) + list(lines) if line.strip()]
+        if not rows:
+            raise ValueError("it holds no row of numbers")
+        values = np.loadtxt(rows, delimiter=",", ndmin=2)
+        if values.size == 0:
+            raise ValueError("its rows hold no numbers")
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise ScenarioError(
             f"{path}: no table of numbers with commas ({shown_text(str(error))})"

@@ -131,3 +131,11 @@ def test_what_a_file_cannot_be_is_told(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((20, 20, 3), dtype=np.uint8)).save(tmp_path / "colour.tif")
     with pytest.raises(Refused, match="3 colours, no height map"):
         read_height_map(tmp_path / "colour.tif", step=1e-5, unit=1e-3)
+
+
+@pytest.mark.parametrize("text", ["", "\n", "place,height\n", "# nothing\n"])
+def test_a_profile_without_a_number_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "heights.csv"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=r"heights\.csv: no table of numbers with commas"):
+        read_height_map(path, step=STEP, unit=1e-3)
