@@ -22,11 +22,11 @@ its lit facets radiate, and the near field of facets closer to each other than a
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement, pairwise
+from dataclasses import replace
+from itertools import combinations_with_replacement
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.compute.engine import thread_count
@@ -35,20 +35,17 @@ from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
 from simulator.materials.fresnel_slab import Material
 from simulator.materials.reflection_table import reflection_table
-from simulator.multibounce.chain_count import Sees, chains_to, outline
+from simulator.multibounce.chain_count import Sees, chains_to
 from simulator.multibounce.frequency_interpolation import (
     EveryFrequency,
     FewFrequencies,
     few_frequencies,
 )
 from simulator.multibounce.iterative_physical_optics import (
-    Bounds,
     Wave,
     direct,
-    onward,
-    onward_bounds,
-    quadrature,
 )
+from simulator.multibounce.passage import Link, Passage, passage_over
 from simulator.multibounce.rough_faces import rough_factor, unit
 
 WAVE_BYTES = 2**29
@@ -58,77 +55,12 @@ from these, at the walls before it: 512 MiB. [byte]"""
 FACETS_AT_ONCE = 1500
 """Most facets of a target in one block. [-]"""
 
-GAUSS_LIMITS = (0.24, 1.28, 2.6)
-"""Half the phase over a facet up to which one, two and three Gauss points are within 1 %. [rad]"""
-
 SeveralProgress = Callable[[int, int], None]
 """Told how much is done, and of how much. [-]"""
 
 
 def untold(done: int, total: int) -> None:
     """Tell nobody."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Passage:
-    """A wave from the ports over walls to a target, not yet worked out."""
-
-    ports: Ports
-    walls: tuple[Face, ...]  # in the order in which they are met, with the points of their phase
-    seen: tuple[Bool[np.ndarray, "_ _"], ...]  # of each wall and what follows it
-    bounds: tuple[Bounds, ...]  # at what follows each wall; the last are those at the target
-
-    @property
-    def spread(self) -> float:
-        """Largest difference of lengths at one facet of the target. [m]."""
-        return self.bounds[-1].spread
-
-    def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Passage":
-        """Choose some of the target's facets."""
-        return replace(
-            self,
-            seen=(*self.seen[:-1], self.seen[-1][:, chosen]),
-            bounds=(*self.bounds[:-1], self.bounds[-1].part(chosen)),
-        )
-
-    def of_ports(self, some: slice) -> "Passage":
-        """Choose some of the ports."""
-        ports = replace(
-            self.ports, positions=self.ports.positions[some], visible=self.ports.visible[some]
-        )
-        return replace(
-            self, ports=ports, bounds=tuple(one.part(slice(None), some) for one in self.bounds)
-        )
-
-    def at_last_wall(self, nodes: Float[np.ndarray, " nodes"]) -> Wave:
-        """Work out the wave that the last wall sends on."""
-        wave = direct(self.walls[0], self.ports, nodes)
-        for place, (wall, onto) in enumerate(pairwise(self.walls)):
-            wave = onward(wave, wall, onto, self.seen[place], self.bounds[place], nodes)
-        return wave
-
-    def arriving(self, sent: Wave, target: Face, nodes: Float[np.ndarray, " nodes"]) -> Wave:
-        """Work out what arrives of the wave at the last wall."""
-        return onward(sent, self.walls[-1], target, self.seen[-1], self.bounds[-1], nodes)
-
-
-@dataclass(frozen=True)
-class Link:
-    """Two waves that a target links: out and back, and how often their chain counts."""
-
-    factor: float
-    out: Passage
-    back: Passage | None  # None: directly
-
-    @property
-    def spread(self) -> float:
-        """Largest difference of lengths. [m]."""
-        return self.out.spread + (0.0 if self.back is None else self.back.spread)
-
-    @property
-    def walls(self) -> tuple[Face, ...]:
-        """All walls but the target."""
-        return self.out.walls + (() if self.back is None else self.back.walls)
 
 
 def ghost_echo(
@@ -176,7 +108,11 @@ def ghost_echo(
         passages = {
             chain: found
             for chain in chains_to(place, faces, sees, seen_directly, max_bounces // 2)
-            if (found := _passage(array, [faces[one] for one in chain], target, sees, frequencies))
+            if (
+                found := passage_over(
+                    array, [faces[one] for one in chain], target, sees, frequencies
+                )
+            )
         }
         links = _echo_links(passages, place, max_bounces, direct_back=seen_directly[place])
         if links:
@@ -279,62 +215,6 @@ def uplink_over_surfaces(
     return pilot
 
 
-def _passage(
-    ports: Ports,
-    chain: Sequence[Face],
-    target: Face,
-    sees: Sees,
-    frequencies: Float[np.ndarray, " freqs"],
-) -> Passage | None:
-    """Prepare the way over walls, from the facets that the ports see; None if there is none."""
-    first = chain[0].part(np.flatnonzero(ports.visible[:, chain[0].source].any(axis=0)))
-    chain = [first, *chain[1:]]
-    walls: list[Face] = []
-    seen: list[Bool[np.ndarray, "_ _"]] = []
-    for place in reversed(range(len(chain))):  # each wall's points depend on what follows
-        before = chain[place - 1].centres if place else ports.positions[:, :2]
-        onto = walls[0] if walls else target
-        wall, sight = _towards(chain[place], onto, before, sees, float(frequencies[-1]))
-        if wall.count == 0:
-            return None
-        walls.insert(0, wall)
-        seen.insert(0, sight)
-    latest, bounds = direct(walls[0], ports, np.ones(1)).bounds, []
-    for wall, onto, sight in zip(walls, [*walls[1:], target], seen, strict=True):
-        latest = onward_bounds(latest, wall, onto, sight)
-        bounds.append(latest)
-    if not latest.longest.any():
-        return None
-    return Passage(ports=ports, walls=tuple(walls), seen=tuple(seen), bounds=tuple(bounds))
-
-
-def _towards(
-    wall: Face,
-    target: Face,
-    before: Float[np.ndarray, "points 2"],
-    sees: Sees,
-    highest: float,
-) -> tuple[Face, Bool[np.ndarray, "wall target"]]:
-    """Choose the facets of a wall that see a target, with the points that their phase needs.
-
-    The phase over a facet turns with the directions of the wave from ``before`` and of what
-    goes to the target.
-    """
-    seen = sees(wall, target)
-    kept = np.flatnonzero(seen.any(axis=1))
-    wall, seen = wall.part(kept), seen[kept]
-    if wall.count == 0:
-        return wall, seen
-    low, high = np.zeros(wall.count), np.zeros(wall.count)
-    for points in (before, target.centres):
-        apart = outline(points)[:, None] - wall.centres
-        along = np.einsum("pfx,fx->pf", apart, wall.edges) / np.linalg.norm(apart, axis=-1)
-        low, high = low + along.min(axis=0), high + along.max(axis=0)
-    phase = np.pi * highest / speed_of_light * float(np.maximum(-low, high).max())
-    count = 1 + sum(phase > limit for limit in GAUSS_LIMITS)
-    return quadrature(wall, count), np.repeat(seen, count, axis=0)
-
-
 def _echo_of(
     target: Face,
     links: Sequence[Link],
@@ -415,7 +295,7 @@ def _pilot_over(
     nothing = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     target = chain[-1]
     target = target.part(np.flatnonzero(array.visible[:, target.source].any(axis=0)))
-    passage = _passage(user, chain[:-1], target, sees, frequencies)
+    passage = passage_over(user, chain[:-1], target, sees, frequencies)
     if passage is None:
         return nothing
     materials = [face.material for face in chain]

@@ -15,38 +15,22 @@ unit line source :math:`G = -\tfrac{j}{4} H_0^{(2)}(kr)`, for comparison with
 two-dimensional full-wave solvers.
 """
 
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports, isotropic
-from simulator.geometry.facets import Facets, Group
-from simulator.materials.facet_reflection import (
-    Legs,
-    angle_class,
-    echo_coefficient,
-    facet_coefficients,
-    half_angle_cosine,
-    reflection_nodes,
-)
+from simulator.geometry.facets import Facets
 from simulator.materials.fresnel_slab import Absorber, Conductor
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes, nodes_needed
 from simulator.scattering.edge_diffraction import edge_echo, edge_view
-from simulator.scattering.rough_triangles import rough_weights
-from simulator.scattering.small_slope import (
-    DirectionGrid,
-    RoughLine,
-    echo_weights,
-    reflection_of_front,
-)
+from simulator.scattering.facet_weights import Leg, MaterialPart
 from simulator.scattering.triangle_transform import triangle_transform
-from simulator.scattering.weighted_curvature import half_space_mirror, middle_permittivity
 
 SAMPLES_AT_ONCE = 4_000_000
 """Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
@@ -61,11 +45,6 @@ its points about the centroid. [-]"""
 
 MOST_TRIED, MARGIN = 16, 1.1
 """Links of which the facets' slopes are looked at, and what the others may exceed them by."""
-
-
-ROUGH_NODES = 4
-"""Fewest frequencies that the weights of rough lines are sampled at: over a third of an octave they
-are then interpolated to 1e-3 of what they add to the tangent plane's. [-]"""
 
 
 def scattered(
@@ -102,17 +81,17 @@ def scattered(
     count = nodes_needed(2 * facets.extent / speed_of_light, stop - start)
     count += transmit.nodes + receive.nodes - 2  # degrees of a product add up
     parts = [
-        _Part(facets, group, count, frequencies, monostatic=monostatic)
+        MaterialPart(facets, group, count, frequencies, monostatic=monostatic)
         for group in facets.by_material
         if not isinstance(group.material, Absorber)
     ]
     if _suits_the_kernel(facets, transmit, receive, parts):
         return _by_kernel(facets, transmit, receive, parts, frequencies, advance)
-    shared = _Leg(facets, transmit, 0) if len(transmit.positions) == 1 else None
+    shared = Leg(facets, transmit, 0) if len(transmit.positions) == 1 else None
 
     def link(index: int) -> Complex[np.ndarray, " freqs"]:
-        inward = shared or _Leg(facets, transmit, index)
-        outward = inward if monostatic else _Leg(facets, receive, index)
+        inward = shared or Leg(facets, transmit, index)
+        outward = inward if monostatic else Leg(facets, receive, index)
         # Both ends must see the same side of the facet.
         lit = inward.lit & outward.lit & (inward.facing * outward.facing > 0)
         spectrum = np.zeros(frequencies.size, dtype=np.complex128)
@@ -134,7 +113,7 @@ def scattered(
 
 
 def _suits_the_kernel(
-    facets: Facets, transmit: Ports, receive: Ports, parts: "list[_Part]"
+    facets: Facets, transmit: Ports, receive: Ports, parts: list[MaterialPart]
 ) -> bool:
     """Tell whether these are many triangles that reflect alike over the band."""
     many = not facets.flat and facets.count * len(receive.positions) >= FEWEST_FOR_KERNEL
@@ -146,7 +125,7 @@ def _by_kernel(
     facets: Facets,
     transmit: Ports,
     receive: Ports,
-    parts: "list[_Part]",
+    parts: list[MaterialPart],
     frequencies: Float[np.ndarray, " freqs"],
     advance: Callable[[], None],
 ) -> Complex[np.ndarray, "links freqs"]:
@@ -170,12 +149,12 @@ def _by_kernel(
     def gain(ports: Ports, index: int) -> Float[np.ndarray, " facets"] | None:
         if ports.pattern is isotropic:
             return None
-        return np.asarray(_Leg(facets, ports, index).gain(np.arange(facets.count), nodes)[0].real)
+        return np.asarray(Leg(facets, ports, index).gain(np.arange(facets.count), nodes)[0].real)
 
     spectrum = np.zeros((count, frequencies.size), dtype=np.complex128)
     for part in parts:
 
-        def weights(index: int, part: _Part = part) -> Weights:
+        def weights(index: int, part: MaterialPart = part) -> Weights:
             sender = int(senders[index])
             lit = transmit.visible[sender]
             lit = lit if monostatic else lit & receive.visible[index]
@@ -191,7 +170,7 @@ def _by_kernel(
                 share=part.share,
             )
 
-        def told(part: _Part = part) -> None:
+        def told(part: MaterialPart = part) -> None:
             if part is parts[-1]:
                 advance()
 
@@ -201,218 +180,12 @@ def _by_kernel(
     return 1j * spectrum
 
 
-class _Part:
-    """The facets of one material: how their sum over the band is sampled."""
-
-    def __init__(
-        self,
-        facets: Facets,
-        group: Group,
-        count: int,
-        frequencies: Float[np.ndarray, " freqs"],
-        *,
-        monostatic: bool,
-    ) -> None:
-        self.material, self.share, self.mask = group
-        self.count = count
-        self.frequencies, self.monostatic = frequencies, monostatic
-        self.polarization = facets.polarization
-        self.permittivity = middle_permittivity(
-            self.material, float(frequencies[0]), float(frequencies[-1])
-        )
-        self.runs = [
-            run
-            for run in facets.runs
-            if run.rough and (self.mask is None or self.mask[run.facets[0]])
-        ]
-        if self.runs:
-            self.count = max(count, ROUGH_NODES)
-        # Towards where it came from, facets reflect alike: the sum is multiplied once.
-        self.common: Complex[np.ndarray, " freqs"] | None = None
-        if monostatic and not isinstance(self.material, Conductor):
-            self.common = echo_coefficient(
-                self.material, frequencies, polarization=self.polarization
-            )
-        self._totals: dict[float, FrequencySum] = {}
-        self._lines: dict[tuple[int, float, int], tuple[RoughLine, DirectionGrid]] = {}
-        self._lock = threading.Lock()
-
-    def total(self, inward: "_Leg", outward: "_Leg", lit: np.ndarray) -> FrequencySum:
-        """Return the sum that samples the band as finely as these facets' angles need it."""
-        same = self.monostatic or isinstance(self.material, Conductor)
-        lowest = 1.0
-        if not same:
-            cosines = half_angle_cosine(inward.direction[lit], outward.direction[lit])
-            if self.runs:
-                ends = np.abs(inward.cosine[lit]), np.abs(outward.cosine[lit])
-                cosines = np.concatenate([cosines, *ends])
-            lowest = angle_class(cosines)
-        with self._lock:
-            if lowest not in self._totals:
-                start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
-                count = self.count
-                if not same:
-                    count += reflection_nodes(self.material, start, stop, lowest=lowest) - 1
-                nodes = chebyshev_nodes(start, stop, count)
-                self._totals[lowest] = FrequencySum(self.frequencies, nodes)
-            return self._totals[lowest]
-
-    def weights(
-        self,
-        inward: "_Leg",
-        outward: "_Leg",
-        some: np.ndarray,
-        nodes: Float[np.ndarray, " nodes"],
-        facets: Facets,
-    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Obliquity times reflection of smooth facets, and what stands for it on rough ones."""
-        if self.share is not None:
-            return self._rough_triangles(inward, outward, some, nodes, facets)
-        smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
-        if smooth.size == some.size:
-            return self._smooth(inward, outward, some, nodes, facets)
-        weights = np.empty((nodes.size, some.size), dtype=np.complex128)
-        if smooth.size:
-            weights[:, smooth] = self._smooth(inward, outward, some[smooth], nodes, facets)
-        for number, run in enumerate(self.runs):
-            chosen = np.flatnonzero(run.places[some] >= 0)
-            for side in (1.0, -1.0):
-                here = chosen[np.sign(inward.cosine[some[chosen]]) == side]
-                if here.size == 0:
-                    continue
-                line, echoes = self._rough_line(number, side, nodes)
-                which, places = some[here], run.places[some[here]]
-                if self.monostatic:
-                    weights[:, here] = echoes(inward.along(facets, which), places)
-                else:
-                    sent, heard = (
-                        (leg.along(facets, which), np.abs(leg.cosine[which]))
-                        for leg in (inward, outward)
-                    )
-                    weights[:, here] = line.weights(
-                        sent, heard, places, side=side, monostatic=False
-                    )
-        if self.common is not None:
-            half = reflection_of_front(self.material, nodes, polarization=self.polarization)
-            weights[:, facets.rough[some]] /= half[:, None]
-        return weights
-
-    def _smooth(
-        self,
-        inward: "_Leg",
-        outward: "_Leg",
-        some: np.ndarray,
-        nodes: Float[np.ndarray, " nodes"],
-        facets: Facets,
-    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        obliquity = np.abs(inward.cosine[some] + outward.cosine[some])
-        coefficients = self._coefficients(inward, outward, some, nodes, flat=facets.flat)
-        return np.asarray(obliquity * coefficients)
-
-    def _rough_triangles(
-        self,
-        inward: "_Leg",
-        outward: "_Leg",
-        some: np.ndarray,
-        nodes: Float[np.ndarray, " nodes"],
-        facets: Facets,
-    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        share, part, side = (
-            float(self.share or 0.0),
-            facets.part(some),
-            np.sign(inward.facing[some]),
-        )
-        one = inward.direction[some].T, inward.fields(some).T
-        other = one if outward is inward else (outward.direction[some].T, outward.fields(some).T)
-        legs = Legs(transmit=one[0], receive=other[0], sent=one[1], received=other[1])
-        added = rough_weights(part, side, legs, self.material, self.permittivity, share)
-        if self.common is not None:
-            added = added / half_space_mirror(self.permittivity)
-        cosines = side * (inward.cosine[some] + outward.cosine[some])
-        mirrored = self._coefficients(inward, outward, some, nodes, flat=False)
-        return np.asarray(mirrored * cosines + added)
-
-    def _rough_line(
-        self, number: int, side: float, nodes: Float[np.ndarray, " nodes"]
-    ) -> tuple[RoughLine, DirectionGrid]:
-        """Return a run's line at these nodes, and its weights for echoes."""
-        run, key = self.runs[number], (number, side, nodes.size)
-        with self._lock:
-            if key not in self._lines:
-                line = RoughLine(
-                    heights=run.heights,
-                    step=run.step,
-                    closed=run.closed,
-                    material=self.material,
-                    polarization=self.polarization,
-                    nodes=nodes,
-                )
-                self._lines[key] = line, echo_weights(line, side=side)
-            return self._lines[key]
-
-    def _coefficients(
-        self,
-        inward: "_Leg",
-        outward: "_Leg",
-        some: np.ndarray,
-        nodes: Float[np.ndarray, " nodes"],
-        *,
-        flat: bool,
-    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Reflect at the nodes; what is common to all facets is left out."""
-        if self.common is not None:
-            return np.ones((1, len(some)))
-        if self.monostatic and isinstance(self.material, Conductor):
-            return np.full((1, len(some)), -1.0 if self.polarization == "vertical" else 1.0)
-        legs = inward.direction[some], outward.direction[some]
-        fields = None if flat else (inward.fields(some), outward.fields(some))
-        return facet_coefficients(
-            self.material, *legs, nodes, fields=fields, polarization=self.polarization
-        )
-
-
-class _Leg:
-    """Distances and directions from one port to all facets."""
-
-    def __init__(self, facets: Facets, ports: Ports, index: int) -> None:
-        towards = ports.positions[index] - facets.centres
-        self.distance = np.sqrt(np.einsum("fx,fx->f", towards, towards))
-        self.direction = towards / self.distance[:, None]
-        self.cosine = np.einsum("fx,fx->f", self.direction, facets.normals)
-        # A surface does not hide itself by its own roughness: the mean surface has to face it.
-        self.facing = self.cosine
-        if facets.relief is not None:
-            self.facing = np.einsum("fx,fx->f", self.direction, facets.relief.normals)
-        self.lit = ports.visible[index] & (facets.two_sided | (self.facing > 0))
-        self.pattern, self.polarization = ports.pattern, ports.polarization
-        self._gains: dict[int, np.ndarray] = {}
-
-    def along(
-        self, facets: Facets, some: Int[np.ndarray, " chosen"]
-    ) -> Float[np.ndarray, " chosen"]:
-        """Component of the direction along a line's mean course. [-]."""
-        direction, normal = self.direction[some], facets.normals[some]
-        return np.asarray(direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1])
-
-    def fields(self, some: np.ndarray) -> Float[np.ndarray, "some 3"]:
-        """Vectors of the antenna's field at some of the facets."""
-        return self.polarization.field(-self.direction[some])
-
-    def gain(
-        self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]
-    ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Field pattern of the port towards some of the facets."""
-        if nodes.size not in self._gains:  # all parts' nodes span the same band
-            self._gains[nodes.size] = self.pattern(-self.direction, self.distance, nodes)
-        return self._gains[nodes.size][:, some]
-
-
 def _partial_link(
     facets: Facets,
     chosen: Bool[np.ndarray, " facets"],
-    inward: _Leg,
-    outward: _Leg,
-    part: _Part,
+    inward: Leg,
+    outward: Leg,
+    part: MaterialPart,
     waves: Waves,
 ) -> Complex[np.ndarray, " freqs"]:
     lit = np.flatnonzero(chosen)
