@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from estimator.results.estimate import Progress
-from mmslam import output
+from mmslam import output, own_results
 from mmslam.measurement import Measurement
 from mmslam.measurement_files import write
 from mmslam.terminal.interruption import interruptions_held
@@ -77,7 +77,7 @@ def solve_to_file(
     progress: Progress | None = None,
 ) -> Measurement:
     """Solve a scenario to a measurement file; ``path`` is refused before any work."""
-    with output.replacing(path, output.refuse_foreign_store) as new:
+    with output.replacing(path, own_results.refuse_foreign_store) as new:
         measurement = simulate_full_wave(scenario, seed=seed, tell=tell, progress=progress)
         write(new, measurement)
     return measurement

@@ -6,7 +6,7 @@ from typing import Any
 
 from estimator.measurement.model import MeasurementError
 from estimator.measurement.store import read_measurement, write_measurement
-from mmslam import output
+from mmslam import output, own_results
 from mmslam.formats.export_touchstone import MAPPING, export_touchstone, refuse_foreign_touchstone
 from mmslam.formats.import_full_wave import import_npz
 from mmslam.formats.import_measured import import_measured as import_by_mapping
@@ -79,7 +79,7 @@ def write(path: str | Path, measurement: Measurement) -> None:
     >>> mmslam.read("own.zarr").echo.samples.shape
     (4, 5)
     """
-    with output.replacing(Path(path), output.refuse_foreign_store) as new:
+    with output.replacing(Path(path), own_results.refuse_foreign_store) as new:
         proper = measurement.without_truth()
         write_measurement(new, proper, truth=measurement.truth_dataset)
 
@@ -156,7 +156,7 @@ def import_to_file(
     source: Path, *, mapping: Path | None, uplink: str | None, path: Path
 ) -> Measurement:
     """Convert other data to a measurement store; ``path`` is refused before any work."""
-    with output.replacing(path, output.refuse_foreign_store) as new:
+    with output.replacing(path, own_results.refuse_foreign_store) as new:
         imported = import_measured(source, mapping, uplink=uplink)
         write(new, imported)
     return imported

@@ -13,7 +13,6 @@ what was out of its place, whatever the moment.
 
 import errno
 import hashlib
-import json
 import os
 import shutil
 import stat
@@ -21,19 +20,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from estimator.measurement.atomic_rename import exchange, rename_new
 from estimator.measurement.file_lock import file_lock
-
-RESULT = "result.json"
-MEASUREMENT = "measurement.zarr"
-REPORT = "report.html"
-TRACK = "track.json"
-TRACK_FIGURE = "track.png"
-FORMAT = 1
-
-FIGURES = ("raw_image.png", "corrected_image.png", "angle_range_map.png", "localization.png")
 
 LONGEST_NAME = 255
 """Longest file name of common file systems. [byte]"""
@@ -189,41 +178,6 @@ def refuse_to_replace_input(folder: Path, path: Path) -> None:
             f"{folder} holds the measurement {path} itself, which would be replaced; "
             "choose another folder with --out"
         )
-
-
-def refuse_foreign_results(folder: Path) -> str | None:
-    """Say why a folder may not be replaced by new results; None if an earlier run made it."""
-    return _refuse_foreign(
-        folder, RESULT, {"users", "mirrors", "versions"}, {MEASUREMENT, REPORT, *FIGURES}
-    )
-
-
-def refuse_foreign_track(folder: Path) -> str | None:
-    """Say why a folder may not be replaced by a new track; None if an earlier one is in it."""
-    return _refuse_foreign(folder, TRACK, {"tracks", "versions"}, {TRACK_FIGURE})
-
-
-def _refuse_foreign(folder: Path, main: str, keys: set[str], beside: set[str]) -> str | None:
-    names = {entry.name for entry in folder.iterdir()}
-    if not names:
-        return None
-    document = _json(folder / main)
-    if document.get("format") != FORMAT or not keys <= document.keys():
-        return f"it is not empty and no earlier run of mmslam made it (no {main} of ours in it)"
-    foreign = sorted(name for name in names - {main, *beside} if not name.startswith("."))
-    if foreign:
-        return f"it holds what mmslam did not write ({', '.join(foreign[:3])})"
-    return None
-
-
-def refuse_foreign_store(folder: Path) -> str | None:
-    """Say why a folder may not be replaced by a new measurement; None if it is one of ours."""
-    if not any(folder.iterdir()):
-        return None
-    root = _json(folder / "zarr.json")
-    if "mmslam_format" not in (root.get("attributes") or {}):
-        return "it is not a measurement that mmslam wrote"
-    return None
 
 
 @contextmanager
@@ -402,11 +356,3 @@ def _why_kept(target: Path, refusal: Refusal) -> str | None:
     if os.path.ismount(target) or Path.cwd().is_relative_to(target):
         return "it is the current folder or a mount point, which cannot be exchanged"
     return refusal(target)
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return document if isinstance(document, dict) else {}

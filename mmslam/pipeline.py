@@ -9,7 +9,7 @@ from typing import Any
 from estimator import localization
 from estimator.measurement import model
 from estimator.results.estimate import Progress
-from mmslam import output
+from mmslam import output, own_results
 from mmslam.measurement import Measurement
 from mmslam.measurement_files import read, write
 from mmslam.plain_text import file_name
@@ -104,7 +104,7 @@ def simulate_to_file(
     scenario: Scenario, *, seed: int, path: Path, progress: Progress | None = None
 ) -> Measurement:
     """Simulate a scenario to a measurement file; ``path`` is refused before any work."""
-    with output.replacing(path, output.refuse_foreign_store) as new:
+    with output.replacing(path, own_results.refuse_foreign_store) as new:
         measurement = simulate(scenario, seed=seed, progress=progress)
         write(new, measurement)
     return measurement
@@ -140,13 +140,13 @@ def run_scenario(
         If the estimator could not take the measurement; said before it is simulated.
     """
     _refuse_what_cannot_be_located(scenario)
-    with output.replacing(folder, output.refuse_foreign_results) as new:
+    with output.replacing(folder, own_results.refuse_foreign_results) as new:
         new.mkdir()
         started = time.perf_counter()
         measurement = simulate(scenario, seed=seed, progress=progress)
         timings = {"simulate": time.perf_counter() - started}
         started = time.perf_counter()
-        write(new / output.MEASUREMENT, measurement)
+        write(new / own_results.MEASUREMENT, measurement)
         timings["write_measurement"] = time.perf_counter() - started
         estimate = locate(measurement, progress=progress)
         result = _write_results(new, measurement, estimate, timings, scenario)
@@ -193,7 +193,7 @@ def locate_measurement(
     measurement = read(path, sample=sample)
     folder = folder or default_folder(measurement, path, sample)
     output.refuse_to_replace_input(folder, path)
-    with output.replacing(folder, output.refuse_foreign_results) as new:
+    with output.replacing(folder, own_results.refuse_foreign_results) as new:
         new.mkdir()
         estimate = locate(measurement, progress=progress)
         result = _write_results(new, measurement, estimate, {}, None)
@@ -227,6 +227,6 @@ def _write_results(
     timings = {**timings, "figures": time.perf_counter() - started}
     result = result_document(measurement, estimate, truth, timings=timings)
     report = render_report(result, measurement, pictures, scenario=scenario)
-    (new / output.REPORT).write_text(report, encoding="utf-8")
-    (new / output.RESULT).write_text(to_json(result), encoding="utf-8")
+    (new / own_results.REPORT).write_text(report, encoding="utf-8")
+    (new / own_results.RESULT).write_text(to_json(result), encoding="utf-8")
     return result

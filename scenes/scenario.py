@@ -11,10 +11,12 @@ from jaxtyping import Float
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from scenes.checks.dimensions import dimension_problems
 from scenes.checks.facet_budget import facet_problems
 from scenes.checks.files import file_problems
-from scenes.checks.multistatic import antenna_places, multistatic_problems
+from scenes.checks.multistatic import multistatic_problems
 from scenes.checks.placement import inconsistencies
+from scenes.checks.points import point_problems
 from scenes.meshes.foreign_scene import with_geometry
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.schema.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
@@ -24,11 +26,13 @@ from scenes.schema.errors import ScenarioError, did_you_mean, problems
 from scenes.schema.impairments import Impairments
 from scenes.schema.materials import MATERIALS, Slab
 from scenes.schema.multistatic import Arc, Places, Transmitter
+from scenes.schema.noise import Noise
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate, SceneObject
 from scenes.schema.point_target import PointTarget
-from scenes.schema.quantities import Checked, Name, Position
+from scenes.schema.quantities import Checked, Name
 from scenes.schema.radio import Radio
 from scenes.schema.roughness import Roughness
+from scenes.schema.user import User
 from scenes.surfaces.facet_spacing import facet_spacing
 
 __all__ = [
@@ -62,36 +66,6 @@ __all__ = [
 
 MOST_SAMPLES = 2**30
 """Most samples of an echo or an uplink: 16 GiB of complex doubles."""
-
-
-class User(Checked):
-    """A user that sends a pilot."""
-
-    position_m: Position = Field(description="the position of the user [m]")
-    antenna: Antenna = Field(default_factory=Isotropic, description="the user's antenna")
-
-    @model_validator(mode="after")
-    def _a_directive_antenna_looks_somewhere(self) -> "User":
-        if isinstance(self.antenna, Directive) and not self.antenna.aims:
-            raise PydanticCustomError(
-                "aims",
-                "a directive antenna must look somewhere; give antenna.aim (the name of an "
-                "object), antenna.aim_m (a point) or antenna.aim_deg (an azimuth)",
-            )
-        return self
-
-    @property
-    def position(self) -> Float[np.ndarray, " 3"]:
-        """Where the user is [m]."""
-        return np.array(self.position_m, dtype=np.float64)
-
-
-class Noise(Checked):
-    """Thermal noise: SNR of each channel sample, on the mean over the array."""
-
-    snr_db: float = Field(
-        float("inf"), ge=-60, allow_inf_nan=True, description="the signal-to-noise ratio [dB]"
-    )
 
 
 class Scenario(Checked):
@@ -136,13 +110,31 @@ class Scenario(Checked):
     @model_validator(mode="after")
     def _possible(self) -> "Scenario":
         # In this order: each step relies on what those before have found sound.
-        found = _dimension_problems(self) + _sample_problems(self)
+        found = [
+            *dimension_problems(
+                dimensions=self.dimensions,
+                waves=self.waves,
+                max_bounces=self.max_bounces,
+                radio=self.radio,
+                station=self.base_station,
+                users=self.users,
+                points=self.points,
+                objects=self.objects,
+            ),
+            *_sample_problems(self),
+        ]
         found = found or file_problems(
             self.objects, self.radio.frequencies, flat=self.dimensions == 2
         )
         found = found or [
             *_aim_problems(self),
-            *_point_problems(self),
+            *point_problems(
+                self.points,
+                waves=self.waves,
+                station=self.base_station,
+                users=self.users,
+                clearance=self.radio.longest_wavelength,
+            ),
             *facet_problems(
                 self.objects, self.radio.shortest_wavelength, flat=self.dimensions == 2
             ),
@@ -272,96 +264,6 @@ def parse_scenario(data: Mapping[str, object]) -> Scenario:
         raise ScenarioError("\n".join(problems(error, Scenario))) from None
 
 
-def _dimension_problems(scenario: Scenario) -> list[str]:
-    found = []
-    flat = scenario.dimensions == 2
-    if scenario.waves == "cylindrical" and not flat:
-        found.append(
-            "waves = 'cylindrical': possible in two dimensions only, and dimensions = 3; "
-            "set waves = 'spherical'"
-        )
-    if scenario.radio.polarization == "horizontal" and not flat:
-        found.append(
-            "radio.polarization = 'horizontal': possible in two dimensions only, and "
-            "dimensions = 3; set it to 'vertical'"
-        )
-    points = {"base_station.position_m": scenario.base_station.position_m}
-    if scenario.base_station.transmit_offset_m is not None:
-        points["base_station.transmit_offset_m"] = scenario.base_station.transmit_offset_m
-        if flat and scenario.max_bounces > 1:
-            found.append(
-                f"base_station.transmit_offset_m = "
-                f"{list(scenario.base_station.transmit_offset_m[:2])}: with transmitter and "
-                f"receiver apart, echoes of one bounce only are known, and max_bounces = "
-                f"{scenario.max_bounces}; set max_bounces = 1, or leave transmit_offset_m out"
-            )
-    points |= antenna_places(scenario.base_station)
-    if scenario.base_station.multistatic and scenario.max_bounces > 1:
-        found.append(
-            f"max_bounces = {scenario.max_bounces}: with transmitter and receiver apart, echoes of "
-            "one bounce only are known; set max_bounces = 1, or give base_station.elements alone"
-        )
-    points |= {f"points.{name}.position_m": one.position_m for name, one in scenario.points.items()}
-    for name, body in scenario.objects.items():
-        points[f"objects.{name}.centre_m"] = body.centre_m
-        if isinstance(body, MeshFile):
-            if flat and body.roughness is not None and body.roughness.rms > 0:
-                found.append(
-                    f"objects.{name}.roughness.rms_mm = {body.roughness.rms_mm}: a mesh can be "
-                    "rough in three dimensions only; set it to 0, set dimensions = 3, or use "
-                    "plates, cylinders and boxes"
-                )
-        elif flat and body.height_m is not None:
-            found.append(
-                f"objects.{name}.height_m = {body.height_m}: a 2-D scene is invariant along z; "
-                "remove it, or set dimensions = 3"
-            )
-        elif not flat and body.height_m is None:
-            found.append(f"objects.{name}.height_m: missing; give the height along z [m]")
-    if flat and isinstance(scenario.base_station.elements, tuple):
-        found.append(
-            f"base_station.elements = {list(scenario.base_station.elements)}: a planar array "
-            "needs dimensions = 3; give one number of elements"
-        )
-    if flat:
-        found += _polarization_problems(scenario)
-    stations: dict[str, BaseStation | User] = {"base_station": scenario.base_station}
-    stations |= {f"users.{name}": user for name, user in scenario.users.items()}
-    for key, station in stations.items():
-        points[f"{key}.position_m"] = station.position_m
-        if isinstance(station.antenna, Directive) and station.antenna.aim_m is not None:
-            points[f"{key}.antenna.aim_m"] = station.antenna.aim_m
-    if flat:
-        found += [
-            f"{key} = {list(point)}: z must be 0 in two dimensions; leave z out, "
-            "or set dimensions = 3"
-            for key, point in points.items()
-            if point[2] != 0
-        ]
-    return found
-
-
-def _polarization_problems(scenario: Scenario) -> list[str]:
-    """In two dimensions radio.polarization is that of all antennas."""
-    station, found = scenario.base_station, []
-    antennas = {"base_station.antenna": station.antenna}
-    if station.transmitter is not None and station.transmitter.antenna is not None:
-        antennas["base_station.transmitter.antenna"] = station.transmitter.antenna
-    antennas |= {f"users.{name}.antenna": user.antenna for name, user in scenario.users.items()}
-    for key, antenna in antennas.items():
-        if antenna.polarization_deg != 0.0:
-            found.append(
-                f"{key}.polarization = {antenna.polarization!r}: in two dimensions all antennas "
-                "have one; leave it out and set radio.polarization, or set dimensions = 3"
-            )
-        if antenna.cross_polar_db is not None:
-            found.append(
-                f"{key}.cross_polar_db = {antenna.cross_polar_db}: in two dimensions nothing is "
-                "cross-polar; leave it out, or set dimensions = 3"
-            )
-    return found
-
-
 def _aim_problems(scenario: Scenario) -> list[str]:
     found = []
     station = scenario.base_station
@@ -389,31 +291,6 @@ def _aim_problems(scenario: Scenario) -> list[str]:
                 scenario.aim(antenna, place)
         except ScenarioError as error:
             found.append(f"{key}: {error}")
-    return found
-
-
-def _point_problems(scenario: Scenario) -> list[str]:
-    if scenario.points and scenario.waves == "cylindrical":
-        return [
-            "waves = 'cylindrical': a point has no radar cross-section in them; set "
-            "waves = 'spherical', or remove the points"
-        ]
-    found = []
-    station = scenario.base_station
-    stations = {"the array": station.element_positions}
-    if station.transmitter is not None:
-        stations["base_station.transmitter"] = station.transmitter.positions
-    stations |= {f"users.{name}": user.position[None] for name, user in scenario.users.items()}
-    clearance = scenario.radio.longest_wavelength
-    for name, point in scenario.points.items():
-        for holder, places in stations.items():
-            distance = float(np.linalg.norm(places - point.position, axis=-1).min())
-            if distance < clearance:
-                found.append(
-                    f"points.{name}.position_m = {list(point.position_m)}: is "
-                    f"{distance * 1e3:.3g} mm from {holder}; it must keep "
-                    f"{clearance * 1e3:.3g} mm (the longest wavelength) away; move it"
-                )
     return found
 
 

@@ -34,6 +34,7 @@ from estimator.measurement.guarded_store import (
     shortened,
 )
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.store_attributes import finite_number, unit_boresight, whole_seed
 
 FORMAT = 1
 
@@ -49,8 +50,6 @@ CONVENTIONS = (
 )
 """How the numbers of a store are meant."""
 
-
-_MOST_DIGITS = 30  # of a number that a message shows
 
 __all__ = [
     "CONVENTIONS",
@@ -331,10 +330,10 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
         echo=echo,
         uplinks=uplinks,
         waves=waves,
-        boresight=_boresight(path, attributes.get("boresight", [0.0, 1.0, 0.0])),
-        clock_offset=_number(path, attributes, "clock_offset_s"),
+        boresight=unit_boresight(path, attributes.get("boresight", [0.0, 1.0, 0.0])),
+        clock_offset=finite_number(path, attributes, "clock_offset_s"),
         scenario=None if (name := attributes.get("scenario")) is None else str(name),
-        seed=_seed(path, attributes),
+        seed=whole_seed(path, attributes),
     )
 
 
@@ -363,47 +362,3 @@ def _array(
         )
     wide = np.complex128 if kind is complex else np.float64
     return np.ascontiguousarray(variable.transpose(*dimensions).values, dtype=wide)
-
-
-def _boresight(path: Path, value: object) -> np.ndarray:
-    try:
-        boresight = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        boresight = np.zeros(0)
-    if boresight.shape != (3,) or not abs(np.linalg.norm(boresight) - 1) < 1e-6:
-        raise MeasurementError(
-            f"{path}: boresight = {shortened(repr(value))}; it must be a unit vector [x, y, z]"
-        )
-    return boresight
-
-
-def _number(path: Path, attributes: dict[str, object], key: str) -> float | None:
-    value = attributes.get(key)
-    if value is None:
-        return None
-    try:
-        number = float(value) if isinstance(value, int | float) else np.nan
-    except OverflowError:  # a whole number of some hundred digits
-        number = np.inf
-    if isinstance(value, bool) or not np.isfinite(number):
-        raise MeasurementError(f"{path}: {key} = {_shown(value)}; it must be a finite number")
-    return number
-
-
-def _seed(path: Path, attributes: dict[str, object]) -> int | None:
-    value = attributes.get("seed")
-    if value is None:
-        return None
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= 2**63:
-        raise MeasurementError(
-            f"{path}: seed = {_shown(value)}; it must be a whole number of at most 63 bits"
-        )
-    return value
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, int) and abs(value) >= 10**_MOST_DIGITS:
-        return f"a whole number of more than {_MOST_DIGITS} digits"  # Python writes no huge ones
-    return shortened(repr(value))

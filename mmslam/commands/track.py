@@ -16,7 +16,7 @@ from estimator.measurement.model import MeasurementError
 from estimator.measurement.store import PARAMETERS, TRUTH
 from estimator.results.estimate import Progress, UserEstimate
 from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
-from mmslam import output
+from mmslam import output, own_results
 from mmslam.measurement_files import read
 from mmslam.moving_users import MovingUser, track_answers
 from mmslam.pipeline import locate
@@ -148,7 +148,7 @@ def track_to_folder(
     acceleration = ACCELERATION if acceleration is None else acceleration
     folder = folder or Path("out") / f"{path.stem}-track"
     output.refuse_to_replace_input(folder, path)
-    with output.replacing(folder, output.refuse_foreign_track) as new:
+    with output.replacing(folder, own_results.refuse_foreign_track) as new:
         new.mkdir()
         tracks = track(path, step=step, acceleration=acceleration, progress=progress)
         users = tracks.users
@@ -161,8 +161,8 @@ def track_to_folder(
         from mmslam.results.track_figure import track_figure
 
         figure = track_figure(users, truths, tracks.mirrors, tracks.aperture)
-        save(figure, new / output.TRACK_FIGURE)
-        (new / output.TRACK).write_text(to_json(document), encoding="utf-8")
+        save(figure, new / own_results.TRACK_FIGURE)
+        (new / own_results.TRACK).write_text(to_json(document), encoding="utf-8")
     return Tracked(folder=folder, document=document)
 
 
@@ -182,7 +182,7 @@ def track_document(
     """
     return plain(
         {
-            "format": output.FORMAT,
+            "format": own_results.FORMAT,
             "versions": versions(),
             "acceleration_m2_s3": acceleration,
             "tracks": [_track(user, truths) for user in users],
@@ -201,7 +201,7 @@ def track_lines(document: Mapping[str, Any], folder: Path) -> Iterator[str]:
                 f"{one['name']}: another choice among ambiguous answers is "
                 f"{100 * one['rival']:.0f} % as probable"
             )
-    yield f"open {folder / output.TRACK_FIGURE}"
+    yield f"open {folder / own_results.TRACK_FIGURE}"
 
 
 def _told(fix: Mapping[str, Any], point: Mapping[str, Any] | None) -> str:

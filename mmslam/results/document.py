@@ -11,7 +11,7 @@ import numpy as np
 from estimator.compute import engine
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
-from mmslam.output import FORMAT
+from mmslam.own_results import FORMAT
 from mmslam.plain_text import json_text
 from validation.metrics.errors import WallError, position_error, wall_errors
 from validation.metrics.truth import Truth
@@ -137,6 +137,7 @@ def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:
         "paths": [
             {
                 "aoa_deg": math.degrees(path.aoa),
+                "elevation_deg": None if path.elevation is None else math.degrees(path.elevation),
                 "range_m": path.path_length,
                 "share": path.share,
                 "mirrors": path.mirrors,

@@ -6,6 +6,7 @@ small figure and table for a notebook, and plots. The numbers are the same objec
 
 import base64
 import io
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import degrees, sqrt
@@ -29,12 +30,12 @@ _DOTS_PER_INCH = 90
 _T = TypeVar("_T")
 
 
-class _Shown:
+class _Shown(ABC):
     """What is shown by its tables, and by a small figure if it can be plotted."""
 
+    @abstractmethod
     def tables(self) -> list[Table]:
         """Return what is shown."""
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         return text(self.tables())

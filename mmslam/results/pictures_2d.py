@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate, Image
-from mmslam import output
+from mmslam import own_results
 from mmslam.plain_text import drawn_plainly
 from mmslam.results import pictures_3d
 from validation.figures import figures_2d, views
@@ -44,7 +44,7 @@ def write_pictures(
         return _saved(folder, _drawn_in_space(estimate, positions, truth))
     drawn: dict[str, Figure] = {}
     for name, image in zip(
-        output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
+        own_results.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
     ):
         if image is not None:
             drawn[name] = image_figure(
@@ -65,7 +65,7 @@ def _drawn_in_space(
 ) -> dict[str, Figure]:
     drawn: dict[str, Figure] = {}
     for name, image in zip(
-        output.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
+        own_results.FIGURES[:2], (estimate.raw_image, estimate.corrected_image), strict=True
     ):
         if image is not None:
             drawn[name] = pictures_3d.volume_figure(

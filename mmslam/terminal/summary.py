@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.measurement.model import Measurement
-from mmslam import output
+from mmslam import own_results
 
 
 def summary_lines(result: Mapping[str, Any], folder: Path) -> Iterator[str]:
@@ -31,7 +31,7 @@ def summary_lines(result: Mapping[str, Any], folder: Path) -> Iterator[str]:
         yield f"not found: the true wall {name!r}"
     yield from (f"note: {note}" for note in result["notes"])
     seconds = sum(result["timings_s"].values())
-    yield f"{seconds:.1f} s; open {folder / output.REPORT}"
+    yield f"{seconds:.1f} s; open {folder / own_results.REPORT}"
 
 
 def measurement_summary(measurement: Measurement) -> dict[str, Any]:

@@ -27,9 +27,6 @@ from simulator.dataset.store import (
     IDENTITY,
     DatasetError,
     GrowingDataset,
-    codec,
-    failed_samples,
-    stored_array,
 )
 from simulator.dataset.task_runner import (
     Result,
@@ -40,6 +37,7 @@ from simulator.dataset.task_runner import (
     work_off,
 )
 from simulator.dataset.variables import FAILED
+from simulator.dataset.zarr_arrays import codec, failed_samples, stored_array
 
 Tally = Callable[[int, int, int], None]
 """Told how many samples are done (the failed ones included), have failed, and there are in all."""

@@ -17,11 +17,9 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import zarr
-from zarr.codecs import BloscCodec
 
 from estimator.measurement.atomic_rename import rename_new
 from estimator.measurement.file_lock import file_lock
@@ -30,6 +28,7 @@ from simulator.dataset.layout import LABEL_SAMPLES, Layout
 from simulator.dataset.sample import Row
 from simulator.dataset.sample_files import flush, is_whole, load_row, numbers_in, save_row
 from simulator.dataset.variables import FAILED, TEXT, Variable
+from simulator.dataset.zarr_arrays import create_store, failed_samples, stored_array
 
 JOB = "dataset.json"
 IDENTITY = ("config", "base", "versions", "code")
@@ -280,88 +279,6 @@ class GrowingDataset:
         for block in collected:
             if not is_whole(self._block_file(block)):
                 self._block_file(block).unlink()
-
-
-def create_store(path: Path, layout: Layout) -> None:
-    """Write an empty dataset: all metadata, and what is the same in all samples.
-
-    Parameters
-    ----------
-    path
-        A folder that does not exist yet.
-    layout
-        What it will hold.
-    """
-    root = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
-    names = {one.group for one in layout.variables} | {one.group for one in layout.constants}
-    groups = {"": root} | {name: root.create_group(name) for name in sorted(names - {""})}
-    for constant in layout.constants:
-        text = constant.values.dtype.kind == "T"
-        array = groups[constant.group].create_array(
-            constant.name,
-            shape=constant.values.shape,
-            dtype=str if text else constant.values.dtype,
-            chunks=constant.values.shape,
-            fill_value="" if text else float("nan"),
-            dimension_names=constant.dimensions,
-            attributes=dict(constant.attributes),
-        )
-        array[...] = constant.values
-    for variable in layout.variables:
-        _create(groups[variable.group], variable, layout)
-
-
-def failed_samples(path: Path) -> Iterator[int]:
-    """Yield the samples of a finished dataset that could not be made."""
-    array = stored_array(zarr.open_group(path, mode="r"), "status")
-    for start in range(0, array.shape[0], LABEL_SAMPLES):
-        status = np.asarray(array[start : start + LABEL_SAMPLES])
-        for at in np.flatnonzero(status == FAILED):
-            yield start + int(at)
-
-
-def stored_array(group: zarr.Group, key: str) -> zarr.Array[Any]:
-    """Open an array of a dataset."""
-    found = group[key]
-    assert isinstance(found, zarr.Array)  # the store is one that create_store made
-    return found
-
-
-def codec(variable: Variable) -> BloscCodec:
-    """Return how a large variable is compressed.
-
-    The bytes of a number are sorted by their weight first: signs and exponents are alike, the
-    rest of a noisy sample is not. Losslessly, some 10 % is all there is to gain.
-    """
-    part = np.dtype(variable.type).itemsize // 2
-    return BloscCodec(cname="zstd", clevel=3, shuffle="shuffle", typesize=part)
-
-
-def _create(group: zarr.Group, variable: Variable, layout: Layout) -> None:
-    shape = (layout.samples, *variable.shape)
-    names = ("sample", *variable.dimensions)
-    if variable.large:
-        group.create_array(
-            variable.name,
-            shape=shape,
-            dtype=variable.type,
-            chunks=(1, *variable.shape),
-            shards=(layout.block, *variable.shape),
-            compressors=[codec(variable)],
-            fill_value=variable.missing,
-            dimension_names=names,
-            attributes=dict(variable.attributes),
-        )
-        return
-    group.create_array(
-        variable.name,
-        shape=shape,
-        dtype=str if variable.type == TEXT else variable.type,
-        chunks=(min(LABEL_SAMPLES, layout.samples), *variable.shape),
-        fill_value=variable.missing,
-        dimension_names=names,
-        attributes=dict(variable.attributes),
-    )
 
 
 def _as_stored(variable: Variable, values: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from simulator.geometry.profile_lines import Run, outline
 
 MOST_SLOPE = {"vertical": 0.6, "horizontal": 0.25}
 """Rms slope of a rough line, by polarization, up to which its echo and pilot were found within 1 dB
-of full wave (:mod:`validation.experiments.full_wave_roughness`). In the horizontal one waves run
+of full wave (:mod:`validation.experiments.full_wave.roughness`). In the horizontal one waves run
 along a conductor, and an echo at 45° was 2 dB too strong beyond. [-]"""
 
 

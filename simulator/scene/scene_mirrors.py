@@ -34,7 +34,7 @@ class SceneMirrors:
 
 
 def scene_mirrors(
-    scenario: Scenario, materials: Mapping[str, Material], sights: tuple[AntennaGroup, ...]
+    scenario: Scenario, materials: Mapping[str, Material], groups: tuple[AntennaGroup, ...]
 ) -> SceneMirrors:
     """Find a scenario's mirrors, and the legs over them.
 
@@ -42,7 +42,7 @@ def scene_mirrors(
     ----------
     scenario, materials
         What there is.
-    sights
+    groups
         The array's antennas.
     """
     parts = {
@@ -59,7 +59,7 @@ def scene_mirrors(
     )
     chains: tuple[Leg, ...] = ()
     if scenario.max_bounces > 1:
-        chains = legs_within_reach(mirrors, sights, scenario.max_bounces)
+        chains = legs_within_reach(mirrors, groups, scenario.max_bounces)
     return SceneMirrors(
         mirrors=mirrors,
         owners=tuple(name for name, part in parts.items() for _ in range(len(part))),

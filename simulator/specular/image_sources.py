@@ -40,16 +40,16 @@ class Leg:
         """Number of mirrors."""
         return len(self.sequence)
 
-    def image(self, sight: AntennaGroup) -> AntennaGroup:
+    def image(self, group: AntennaGroup) -> AntennaGroup:
         """Mirror antennas, with the direction in which they look."""
         if not self.sequence:
-            return sight
+            return group
         pattern = AntennaPattern(
-            sight.pattern.antenna,
-            np.einsum("xy,y->x", self.turn, sight.pattern.aim),
-            sight.pattern.polarization.turned(self.turn),
+            group.pattern.antenna,
+            np.einsum("xy,y->x", self.turn, group.pattern.aim),
+            group.pattern.polarization.turned(self.turn),
         )
-        places = np.einsum("xy,ny->nx", self.turn, sight.positions) + self.shift
+        places = np.einsum("xy,ny->nx", self.turn, group.positions) + self.shift
         return AntennaGroup(positions=places, pattern=pattern)
 
     def onward(self, mirrors: Mirrors, *sequence: int) -> "Leg":
@@ -72,7 +72,7 @@ DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
 
 
 def legs_within_reach(
-    mirrors: Mirrors, sights: Sequence[AntennaGroup], most: int
+    mirrors: Mirrors, groups: Sequence[AntennaGroup], most: int
 ) -> tuple[Leg, ...]:
     """Find the legs of one to so many mirrors that antennas' patterns reach.
 
@@ -80,7 +80,7 @@ def legs_within_reach(
     ----------
     mirrors
         All there are.
-    sights
+    groups
         Antennas; the leg must be in reach of one of them.
     most
         Most mirrors of a leg.
@@ -101,7 +101,7 @@ def legs_within_reach(
         for mirror in range(len(mirrors)):
             if leg.sequence and leg.sequence[-1] == mirror:
                 continue
-            images = [leg.image(sight) for sight in sights]
+            images = [leg.image(group) for group in groups]
             bounds = [i.at_most(centres[mirror : mirror + 1], float(radii[mirror])) for i in images]
             if max(float(bound[0]) for bound in bounds) >= LEVEL and any(
                 _reflects(mirrors, mirror, image) for image in images

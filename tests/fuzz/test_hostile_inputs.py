@@ -6,6 +6,8 @@ always the same ones; ``MMSLAM_FUZZ_EXAMPLES`` sets their number for each of the
 ``pytest -m slow tests/fuzz`` tries 100 000 in all, others each time.
 """
 
+# Over 400 lines: a strategy for each format, and one way to try them.
+
 import copy
 import io
 import json

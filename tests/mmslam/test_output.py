@@ -12,16 +12,17 @@ from pathlib import Path
 import pytest
 
 from estimator.measurement import atomic_rename, file_lock
-from mmslam import output
-from mmslam.output import OutputError, refuse_foreign_results, refuse_foreign_store, replacing
+from mmslam import output, own_results
+from mmslam.output import OutputError, replacing
+from mmslam.own_results import refuse_foreign_results, refuse_foreign_store
 
 OURS = json.dumps({"format": 1, "users": [], "mirrors": [], "versions": {}})
 
 
 def fill(folder: Path, mark: str = "new") -> None:
     folder.mkdir()
-    (folder / output.RESULT).write_text(OURS)
-    (folder / output.REPORT).write_text(mark)
+    (folder / own_results.RESULT).write_text(OURS)
+    (folder / own_results.REPORT).write_text(mark)
 
 
 def everything_below(folder: Path) -> list[str]:
@@ -46,8 +47,8 @@ def test_our_own_results_are_replaced(tmp_path: Path) -> None:
     fill(tmp_path / "out", "old")
     with replacing(tmp_path / "out", refuse_foreign_results) as new:
         fill(new)
-        assert (tmp_path / "out" / output.REPORT).read_text() == "old"
-    assert (tmp_path / "out" / output.REPORT).read_text() == "new"
+        assert (tmp_path / "out" / own_results.REPORT).read_text() == "old"
+    assert (tmp_path / "out" / own_results.REPORT).read_text() == "new"
     assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
 
 
@@ -61,7 +62,7 @@ def test_a_failure_leaves_everything_as_it_was(tmp_path: Path, error: type[BaseE
     fill(tmp_path / "out", "old")
     with pytest.raises(error):
         fail(tmp_path / "out")
-    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert (tmp_path / "out" / own_results.REPORT).read_text() == "old"
     with pytest.raises(error):
         fail(tmp_path / "x" / "y")
     assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
@@ -84,7 +85,7 @@ def test_an_interruption_between_the_two_renames_puts_the_old_folder_back(
         replacing(tmp_path / "out", refuse_foreign_results) as new,
     ):
         fill(new)
-    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert (tmp_path / "out" / own_results.REPORT).read_text() == "old"
     assert everything_below(tmp_path) == ["out", "out/report.html", "out/result.json"]
 
 
@@ -111,7 +112,7 @@ def test_what_the_user_put_beside_our_results_is_not_deleted(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"format": 1}', '{"format": 2, "users": []}'])
 def test_a_foreign_result_file_does_not_make_a_folder_ours(tmp_path: Path, content: str) -> None:
-    (tmp_path / output.RESULT).write_text(content)
+    (tmp_path / own_results.RESULT).write_text(content)
     assert refuse_foreign_results(tmp_path) is not None
 
 
@@ -119,7 +120,7 @@ def test_an_empty_folder_may_be_filled(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with replacing(tmp_path / "out", refuse_foreign_results) as new:
         fill(new)
-    assert (tmp_path / "out" / output.RESULT).exists()
+    assert (tmp_path / "out" / own_results.RESULT).exists()
 
 
 def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
@@ -157,7 +158,7 @@ def test_a_link_is_followed_and_kept(tmp_path: Path) -> None:
     with replacing(tmp_path / "link", refuse_foreign_results) as new:
         fill(new)
     assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "real" / output.REPORT).read_text() == "new"
+    assert (tmp_path / "real" / own_results.REPORT).read_text() == "new"
 
 
 @pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES])
@@ -244,7 +245,8 @@ def test_ctrl_c_in_the_middle_of_a_write_leaves_nothing_half_written(tmp_path: P
         import sys, time
         from pathlib import Path
         from mmslam.terminal.exit_codes import told_clearly
-        from mmslam.output import refuse_foreign_results, replacing
+        from mmslam.output import replacing
+        from mmslam.own_results import refuse_foreign_results
         with told_clearly(), replacing(Path(sys.argv[1]), refuse_foreign_results) as new:
             new.mkdir()
             (new / "result.json").write_text("{")
@@ -284,8 +286,8 @@ def test_notes_added_while_the_command_works_are_not_deleted(tmp_path: Path, way
     with pytest.raises(OutputError, match=r"out was changed.*notes\.txt.*out-new1"):
         work()
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
-    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
-    assert (tmp_path / "out-new1" / output.REPORT).read_text() == "new"  # hours of work, maybe
+    assert (tmp_path / "out" / own_results.REPORT).read_text() == "old"
+    assert (tmp_path / "out-new1" / own_results.REPORT).read_text() == "new"  # hours of work, maybe
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "out-new1"]
 
 
@@ -319,7 +321,7 @@ def test_what_is_changed_in_the_last_instant_is_put_back(
     with pytest.raises(OutputError, match=r"notes\.txt"):
         work()
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
-    assert (tmp_path / "out" / output.REPORT).read_text() == "old"
+    assert (tmp_path / "out" / own_results.REPORT).read_text() == "old"
 
 
 def test_two_commands_on_one_output_do_not_work_at_once(tmp_path: Path) -> None:

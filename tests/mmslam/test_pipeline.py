@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from mmslam import output
+from mmslam import own_results
 from mmslam.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -67,17 +67,17 @@ def without_timings(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_stdout_is_the_result_file(printed: str, folder: Path) -> None:
-    assert printed == (folder / "out" / output.RESULT).read_text(encoding="utf-8")
+    assert printed == (folder / "out" / own_results.RESULT).read_text(encoding="utf-8")
 
 
 def test_the_folder_holds_what_was_promised_and_nothing_lies_beside_it(
     result: dict[str, Any], folder: Path
 ) -> None:
     assert {path.name for path in (folder / "out").iterdir()} == {
-        *output.FIGURES,
-        output.RESULT,
-        output.REPORT,
-        output.MEASUREMENT,
+        *own_results.FIGURES,
+        own_results.RESULT,
+        own_results.REPORT,
+        own_results.MEASUREMENT,
     }
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
 
@@ -108,7 +108,9 @@ def test_the_mirror_is_found_within_its_stated_error(result: dict[str, Any]) -> 
 def test_simulating_again_gives_the_same_bytes(result: dict[str, Any], folder: Path) -> None:
     again = CliRunner().invoke(app, ["simulate", *SMALL, "-o", str(folder / "again.zarr")])
     assert again.exit_code == 0, again.output
-    first = xr.load_dataset(folder / "out" / output.MEASUREMENT, engine="zarr", consolidated=False)
+    first = xr.load_dataset(
+        folder / "out" / own_results.MEASUREMENT, engine="zarr", consolidated=False
+    )
     second = xr.load_dataset(folder / "again.zarr", engine="zarr", consolidated=False)
     assert first.echo.values.tobytes() == second.echo.values.tobytes()
     assert first.uplink.values.tobytes() == second.uplink.values.tobytes()
@@ -118,17 +120,17 @@ def test_simulating_again_gives_the_same_bytes(result: dict[str, Any], folder: P
 def test_locating_from_the_file_answers_as_the_run_did(
     result: dict[str, Any], folder: Path
 ) -> None:
-    store = str(folder / "out" / output.MEASUREMENT)
+    store = str(folder / "out" / own_results.MEASUREMENT)
     located = CliRunner().invoke(app, ["locate", store, "--json", "--out", str(folder / "located")])
     assert located.exit_code == 0, located.output
     assert without_timings(json.loads(located.stdout)) == without_timings(result)
-    assert not (folder / "located" / output.MEASUREMENT).exists()
+    assert not (folder / "located" / own_results.MEASUREMENT).exists()
 
 
 def test_results_never_replace_the_measurement_they_come_from(
     result: dict[str, Any], folder: Path
 ) -> None:
-    store = folder / "out" / output.MEASUREMENT
+    store = folder / "out" / own_results.MEASUREMENT
     refused = CliRunner().invoke(app, ["locate", str(store), "--out", str(folder / "out")])
     assert refused.exit_code == 2
     assert "holds the measurement" in refused.stderr

@@ -1,4 +1,6 @@
 import math
+
+# Over 400 lines: every key of a scenario is refused or read here.
 from typing import Any
 
 import numpy as np

@@ -1,11 +1,6 @@
 """The simulator against full-wave solutions, stored ones and our own."""
 
-from validation.experiments import (
-    full_wave_bodies,
-    full_wave_localization,
-    full_wave_roughness,
-    full_wave_wall,
-)
+from validation.experiments.full_wave import bodies, localization, roughness, wall
 from validation.full_wave.ghost_comparison import LEAST_CORRELATION as GHOST_CORRELATION
 from validation.full_wave.ghost_comparison import MOST_LEVEL_DB as GHOST_LEVEL_DB
 from validation.full_wave.ghost_comparison import compare_ghosts
@@ -76,9 +71,9 @@ def ghosts(effort: Effort, tell: Tell) -> Finding:
 
 def solver(effort: Effort, tell: Tell) -> Finding:
     """Check our own method of moments against series, refinement and the stored solution."""
-    found = full_wave_wall.solver_check()
+    found = wall.solver_check()
     tell(1, 2)
-    bodies = full_wave_bodies.body_errors()
+    series = bodies.body_errors()
     tell(2, 2)
     return Finding(
         rows=[
@@ -86,21 +81,21 @@ def solver(effort: Effort, tell: Tell) -> Finding:
                 name="method of moments: field round a cylinder, relative error",
                 stated="Bessel series",
                 measured=found.series_error,
-                high=full_wave_wall.MOST_SERIES_ERROR,
+                high=wall.MOST_SERIES_ERROR,
                 origin="spectral quadrature",
             ),
             Row(
                 name="method of moments: rough wall of 8 cm, change with twice the unknowns",
                 stated="none",
                 measured=found.refinement,
-                high=full_wave_wall.MOST_REFINEMENT,
+                high=wall.MOST_REFINEMENT,
                 origin="converged far below what it is compared with",
             ),
             Row(
                 name="method of moments: the stored wall of 40 cm, relative difference",
                 stated="an independent code",
                 measured=found.reference_error,
-                high=full_wave_wall.MOST_REFERENCE_ERROR,
+                high=wall.MOST_REFERENCE_ERROR,
                 origin="the wall's profile is interpolated between its 8001 points by either",
             ),
             *(
@@ -111,7 +106,7 @@ def solver(effort: Effort, tell: Tell) -> Finding:
                     high=one.most,
                     origin="the grid, and what comes back from the ends of slabs and faces",
                 )
-                for one in bodies
+                for one in series
             ),
         ]
     )
@@ -119,28 +114,28 @@ def solver(effort: Effort, tell: Tell) -> Finding:
 
 def trust(effort: Effort, tell: Tell) -> Finding:
     """Compare the simulator with full wave over rms height and correlation length."""
-    told: list[full_wave_roughness.Comparison] = []
+    told: list[roughness.Comparison] = []
 
-    def advance(comparison: full_wave_roughness.Comparison) -> None:
+    def advance(comparison: roughness.Comparison) -> None:
         told.append(comparison)
         tell(len(told), len(statistics))
 
     quick = effort == "quick"
-    statistics = full_wave_roughness.QUICK if quick else full_wave_roughness.STATISTICS
-    realisations = 1 if quick else full_wave_roughness.REALISATIONS
-    found = full_wave_roughness.trust_map(statistics, realisations=realisations, advance=advance)
+    statistics = roughness.QUICK if quick else roughness.STATISTICS
+    realisations = 1 if quick else roughness.REALISATIONS
+    found = roughness.trust_map(statistics, realisations=realisations, advance=advance)
     rows = []
     for one in found:
         if one.limits is None:
             continue
-        wall = f"{one.rms_mm:g} mm rms, {one.correlation_mm:g} mm long (slope {one.slope:.2f})"
+        surface = f"{one.rms_mm:g} mm rms, {one.correlation_mm:g} mm long (slope {one.slope:.2f})"
         for part, what in (("echo", "echo"), ("uplink", "pilot")):
             least = getattr(one.limits, part)
             most = getattr(one.limits, f"{part}_level_db")
             if least > 0:
                 rows.append(
                     Row(
-                        name=f"{wall}: {what}, correlation",
+                        name=f"{surface}: {what}, correlation",
                         stated="method of moments on the same profiles",
                         measured=getattr(one, part),
                         low=least,
@@ -149,7 +144,7 @@ def trust(effort: Effort, tell: Tell) -> Finding:
                 )
             rows.append(
                 Row(
-                    name=f"{wall}: {what}, level over full wave",
+                    name=f"{surface}: {what}, level over full wave",
                     stated="0 dB",
                     measured=getattr(one, f"{part}_level_db"),
                     unit="dB",
@@ -158,23 +153,23 @@ def trust(effort: Effort, tell: Tell) -> Finding:
                     origin="the same",
                 )
             )
-    return Finding(rows=rows, draw=lambda figure: full_wave_roughness.draw_on(figure, found))
+    return Finding(rows=rows, draw=lambda figure: roughness.draw_on(figure, found))
 
 
 def located(effort: Effort, tell: Tell) -> Finding:
     """Locate the user on full-wave data of several realisations."""
-    name = next(iter(full_wave_localization.CASES))
-    trials = full_wave_localization.TRIALS
+    name = next(iter(localization.CASES))
+    trials = localization.TRIALS
     done = []
 
-    def advance(trial: full_wave_localization.Trial) -> None:
+    def advance(trial: localization.Trial) -> None:
         done.append(trial)
         tell(len(done), trials)
 
-    found = full_wave_localization.localization(name, trials=trials, advance=advance)
+    found = localization.localization(name, trials=trials, advance=advance)
     errors = error_summary(list(found.errors))
     outside = sum(
-        one.full_wave.status != "found" or not one.full_wave.square < full_wave_localization.REGION
+        one.full_wave.status != "found" or not one.full_wave.square < localization.REGION
         for one in found.trials
     )
     return Finding(
@@ -188,7 +183,7 @@ def located(effort: Effort, tell: Tell) -> Finding:
             ),
             *_error_rows(name, errors, trials),
         ],
-        draw=lambda figure: full_wave_localization.draw(figure.subplots(), found),
+        draw=lambda figure: localization.draw(figure.subplots(), found),
     )
 
 
@@ -203,8 +198,8 @@ def _error_rows(name: str, errors: ErrorSummary, trials: int) -> list[Row]:
             origin="the design's bounds of slam_2d",
         )
         for what, value, limit in (
-            ("median", errors.median, full_wave_localization.MOST_MEDIAN),
-            ("worst", errors.worst, full_wave_localization.MOST_WORST),
+            ("median", errors.median, localization.MOST_MEDIAN),
+            ("worst", errors.worst, localization.MOST_WORST),
         )
     ]
 

@@ -143,14 +143,14 @@ CLAIMS = (
     ),
     Claim(
         key="fig02_10_posts",
-        title="Hidden posts are folded to where they are",
+        title="Hidden posts are unfolded to where they are",
         source="thesis figure 2.10",
         measure=posts,
         minutes=8.0,
     ),
     Claim(
         key="fig02_11_box",
-        title="A hidden box is folded to where it is",
+        title="A hidden box is unfolded to where it is",
         source="thesis figure 2.11",
         measure=box,
         quick=False,

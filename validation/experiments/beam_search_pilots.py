@@ -36,6 +36,8 @@ References
    IEEE Trans. Commun. 70(4), 2022.
 """
 
+# Over 400 lines: codebooks, searches and their scores are one comparison.
+
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

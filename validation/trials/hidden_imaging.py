@@ -208,7 +208,7 @@ def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
             unit="mm",
             low=-1e3 * OFFSET_LIMIT,
             high=1e3 * OFFSET_LIMIT,
-            origin="half of the range claim of folded targets",
+            origin="half of the range claim of unfolded targets",
         ),
         Row(
             name="objects missed",
@@ -218,7 +218,7 @@ def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
             origin="all of them are there in every realisation",
         ),
         Row(
-            name=f"folded front faces along range, {seeds}",
+            name=f"unfolded front faces along range, {seeds}",
             stated="thesis: at their places, range resolution 1.5 mm",
             measured=1e3 * _worst([abs(target.range_error) for target in targets]),
             unit="mm",
@@ -226,7 +226,7 @@ def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
             origin="range cell c/2B of 100 GHz",
         ),
         Row(
-            name=f"folded front faces across, over their cell, {seeds}",
+            name=f"unfolded front faces across, over their cell, {seeds}",
             stated="thesis: at their places",
             measured=_worst([target.across_error / target.cell_across for target in targets]),
             high=1.0,

@@ -1,5 +1,7 @@
 """The whole estimator, on echoes and pilots in closed form, and once on the simulator's."""
 
+# Over 400 lines: its rooms, in closed form, serve all cases.
+
 from dataclasses import dataclass, replace
 from typing import Any
 

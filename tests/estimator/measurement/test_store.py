@@ -1,4 +1,6 @@
 import json
+
+# Over 400 lines: one store is damaged in every way.
 import shutil
 import tempfile
 from dataclasses import replace

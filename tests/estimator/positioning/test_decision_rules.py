@@ -1,5 +1,7 @@
 """From waves to an answer, on waves that are written down: each rule in the plane and in space."""
 
+# Over 400 lines: each rule is tried in both dimensions on the same maps.
+
 from dataclasses import dataclass, replace
 
 import numpy as np

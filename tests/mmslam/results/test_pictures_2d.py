@@ -6,7 +6,7 @@ from matplotlib.image import imread
 
 from estimator.measurement.model import Measurement
 from estimator.results.estimate import Estimate
-from mmslam import output
+from mmslam import own_results
 from mmslam.results.pictures_2d import write_pictures
 from validation.metrics.truth import Truth
 
@@ -15,7 +15,7 @@ def test_all_four_figures_are_drawn_and_none_is_blank(
     tmp_path: Path, measurement: Measurement, estimate: Estimate, truth: Truth
 ) -> None:
     pictures = write_pictures(tmp_path, measurement, estimate, truth)
-    assert sorted(pictures) == sorted(output.FIGURES)
+    assert sorted(pictures) == sorted(own_results.FIGURES)
     for path in pictures.values():
         pixels = imread(path)
         assert min(pixels.shape[:2]) > 450
@@ -28,7 +28,7 @@ def test_the_same_result_gives_the_same_bytes(
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         write_pictures(tmp_path / folder, measurement, estimate, truth)
-    for name in output.FIGURES:
+    for name in own_results.FIGURES:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 

@@ -9,7 +9,7 @@ from scenes.files.loading import load_scenario
 from scenes.schema.radio import Polarization
 from simulator.scattering.edge_diffraction import fringe
 from simulator.simulation import simulate
-from validation.experiments.full_wave_localization import WALL, strip_scene
+from validation.experiments.full_wave.localization import WALL, strip_scene
 from validation.full_wave.strip_scattering import strip_response
 
 angles = st.floats(0.05, np.pi - 0.05)

@@ -1,4 +1,6 @@
 from collections.abc import Callable
+
+# Over 400 lines: one geometry serves all bounds.
 from functools import partial
 
 import numpy as np

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.experiments import full_wave_bodies as module
+from validation.experiments.full_wave import bodies as module
 from validation.full_wave.boundary_equations import Polarisation
 
 

@@ -1,6 +1,6 @@
 r"""How exact the full-wave solver is for both polarisations, dielectrics and edges.
 
-Run as ``python -m validation.experiments.full_wave_bodies``; it takes half a minute.
+Run as ``python -m validation.experiments.full_wave.bodies``; it takes half a minute.
 
 Not in the thesis, whose solver is a commercial one. Closed forms are the references
 (:mod:`validation.analytic.line_source_scattering`), lengths are in wavelengths. Claims that are

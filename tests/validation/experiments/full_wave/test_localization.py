@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from scenes.files.loading import load_scenario
 from scenes.realisations.object_surface import object_surface
-from validation.experiments.full_wave_localization import (
+from validation.experiments.full_wave.localization import (
     CASES,
     HALF_SIZE,
     Case,

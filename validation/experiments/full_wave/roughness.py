@@ -1,6 +1,6 @@
 r"""Over which roughness the ray-traced model may be trusted: simulator against full wave.
 
-Run as ``python -m validation.experiments.full_wave_roughness [FIGURE.png [FOLDER]]``. It takes some
+Run as ``python -m validation.experiments.full_wave.roughness [FIGURE.png [FOLDER]]``. It takes some
 ten minutes on two cores, and continues where it was stopped if FOLDER is given.
 
 Not in the thesis, which calculates with full waves only. A conducting wall of 8 cm takes the
@@ -57,7 +57,7 @@ from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
 from scenes.schema.objects import Plate
 from simulator.simulation import simulate
-from validation.experiments.full_wave_localization import USER, WALL, strip_scene
+from validation.experiments.full_wave.localization import USER, WALL, strip_scene
 from validation.full_wave.band_interpolation import band_fields
 
 Part = Literal["echo", "image", "uplink"]

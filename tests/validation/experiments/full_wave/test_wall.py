@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from validation.experiments.full_wave_wall import (
+from validation.experiments.full_wave.wall import (
     SolverCheck,
     check,
     cylinder_error,

@@ -1,6 +1,6 @@
 r"""The estimator on full-wave data, end to end: where the user of ``slam_2d`` is found.
 
-Run as ``python -m validation.experiments.full_wave_localization [FOLDER [TRIALS [CASE …]]]``. It
+Run as ``python -m validation.experiments.full_wave.localization [FOLDER [TRIALS [CASE …]]]``. It
 takes about two minutes a trial on two idle cores, keeps what it solved in FOLDER (by default
 ``full_wave_localization``) and continues there when started again.
 

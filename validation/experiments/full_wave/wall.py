@@ -1,7 +1,7 @@
 r"""The method of moments on its own: how exact and how fast it is, and its longest run.
 
-Run as ``python -m validation.experiments.full_wave_wall`` for the checks (half a minute), or as
-``python -m validation.experiments.full_wave_wall FILE.npz [REFERENCE.npz]`` to solve the thesis'
+Run as ``python -m validation.experiments.full_wave.wall`` for the checks (half a minute), or as
+``python -m validation.experiments.full_wave.wall FILE.npz [REFERENCE.npz]`` to solve the thesis'
 wall at full size and write it in the layout of :mod:`validation.full_wave.wall_comparison`: 0.40 m
 long, 0.8 m away, 260 positions, 1001 frequencies from 220 to 295 GHz, the user 1 m behind it with
 an open and with a beam antenna. What is solved is kept in the folder ``FILE.parts`` and taken up
@@ -29,7 +29,7 @@ from scipy.special import hankel2, jv
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import Scenario
-from validation.experiments.full_wave_localization import USER, WALL, strip_scene
+from validation.experiments.full_wave.localization import USER, WALL, strip_scene
 from validation.full_wave.conducting_contour import circle
 from validation.full_wave.line_source import LineSource
 from validation.full_wave.method_of_moments import scattered_fields

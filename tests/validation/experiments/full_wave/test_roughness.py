@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from validation.experiments.full_wave_roughness import (
+from validation.experiments.full_wave.roughness import (
     Comparison,
     agreement,
     check,

@@ -1,0 +1,1 @@
+"""Our simulator and our estimator against full-wave solutions."""
