@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 
 from estimator.measurement.model import MeasurementError
-from mmslam.formats.csv_columns import CsvGrid, read_csv_grid
 from mmslam.formats.hdf5_files import hdf5_array, is_hdf5
 from mmslam.formats.matlab_files import matlab_array
 from mmslam.formats.numpy_files import npy_array, npz_arrays
+from mmslam.formats.text.csv_columns import CsvGrid, read_csv_grid
+from mmslam.formats.text.text_numbers import read_matrix
+from mmslam.formats.time_domain.gssi_files import read_dzt
 from scenes.files.toml_reader import is_file
 
 LARGEST = 2**28
@@ -25,10 +27,18 @@ SUFFIXES = {
     ".cdf": "netcdf",
     ".csv": "csv",
     ".tsv": "csv",
+    ".txt": "csv",
+    ".dat": "csv",
+    ".asc": "csv",
+    ".out": "hdf5",
+    ".dzt": "dzt",
     ".npz": "npz",
     ".npy": "npy",
 }
 """What a file's name says about its format."""
+
+NAMELESS = ("npy", "csv", "dzt")
+"""Formats whose files may hold one array without a name."""
 
 _NETCDF_3 = (b"CDF\x01", b"CDF\x02")
 
@@ -42,7 +52,7 @@ class ArrayFiles:
         self._coordinates = coordinates
         self._tables: dict[Path, CsvGrid] = {}
 
-    def array(self, path: Path, name: str | None) -> np.ndarray:
+    def array(self, path: Path, name: str | None, *, gaps: bool = False) -> np.ndarray:
         """Read an array of numbers.
 
         Parameters
@@ -50,7 +60,10 @@ class ArrayFiles:
         path
             The file.
         name
-            The variable, dataset or column; None for an .npy file, which holds one only.
+            The variable, dataset or column; None for an .npy file of one array (of several, it is
+            their number, from 0), a GSSI file, and a text file that is one matrix.
+        gaps
+            Let NaN through: what was not measured is left out elsewhere.
 
         Raises
         ------
@@ -58,13 +71,11 @@ class ArrayFiles:
             If the file is not what its name says, or holds no such array of finite numbers.
         """
         kind = format_of(path)
-        if (name is None) != (kind == "npy"):
+        if name is None and kind not in NAMELESS:
             raise MeasurementError(
-                f"{path}: an .npy file holds one array without a name; leave variable out"
-                if kind == "npy"
-                else f"{path}: which of its arrays? name it by variable in the mapping"
+                f"{path}: which of its arrays? name it by variable in the mapping"
             )
-        values = npy_array(path) if name is None else self._named(path, kind, name)
+        values = self._nameless(path, kind) if name is None else self._named(path, kind, name)
         if values.dtype.kind not in "iufc":
             raise MeasurementError(
                 f"{path}: {name or 'the array'!r} holds {values.dtype}; only numbers are read"
@@ -73,13 +84,21 @@ class ArrayFiles:
             raise MeasurementError(
                 f"{path}: {name or 'the array'!r} is empty (shape {values.shape}); choose another"
             )
-        bad = np.count_nonzero(~np.isfinite(values))
+        bad = np.count_nonzero(np.isinf(values) if gaps else ~np.isfinite(values))
         if bad:
             raise MeasurementError(
                 f"{path}: {bad} of {values.size} values of {name or 'the array'!r} are NaN, "
                 "infinite or missing; measure again, or remove those positions"
             )
         return values
+
+    def _nameless(self, path: Path, kind: str) -> np.ndarray:
+        match kind:
+            case "csv":
+                return read_matrix(path)
+            case "dzt":
+                return read_dzt(path).traces
+        return npy_array(path)
 
     def _named(self, path: Path, kind: str, name: str) -> np.ndarray:
         match kind:
@@ -89,6 +108,12 @@ class ArrayFiles:
                         path, frequency=self._frequency, coordinates=self._coordinates
                     )
                 return self._tables[path].array(name)
+            case "npy":
+                return npy_array(path, name)
+            case "dzt":
+                raise MeasurementError(
+                    f"{path}: a GSSI file holds one array without a name; leave variable out"
+                )
             case "npz":
                 return npz_arrays(path, only=name, largest=LARGEST)[name]
             case "mat":

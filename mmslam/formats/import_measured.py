@@ -14,9 +14,10 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement.calibration import equalise, remove_path, subtract_background
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
-from mmslam.formats.mapping import EchoTable, SignalTable, SweepMapping
+from mmslam.formats.array_reader import FILES, ArrayReader
+from mmslam.formats.boresight import boresight_of
+from mmslam.formats.mapping import SweepMapping
 from mmslam.formats.measured_signals import (
-    ArrayReader,
     FolderReader,
     Positions,
     Signal,
@@ -24,6 +25,7 @@ from mmslam.formats.measured_signals import (
     told,
 )
 from mmslam.formats.plausibility import sign_note, strength_note
+from mmslam.formats.tables.signal_tables import EchoTable, SignalTable
 from mmslam.formats.touchstone_files import SUFFIX
 
 Data = TypeVar("Data", Echo, Uplink)
@@ -43,7 +45,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
     Parameters
     ----------
     source
-        A folder of Touchstone files, or an array or CSV file.
+        A folder of Touchstone files or of one array or CSV file for each position, or one file.
     mapping
         What in it is what.
     base
@@ -63,7 +65,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
         )
     reader: SignalReader = (
         FolderReader(source, mapping, base)
-        if source.is_dir()
+        if source.is_dir() and not _holds_arrays(mapping)
         else ArrayReader(source, mapping, base)
     )
     notes: list[str] = []
@@ -93,17 +95,32 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             )
         uplinks.append(_calibrated(reader, pilot, table, name))
         notes += _notes(source, name, uplinks[-1], found)
+    array = echo.positions if echo is not None else uplinks[0].positions
+    given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
+    boresight, remark = boresight_of(str(source), array, given)
+    notes += [] if remark is None else [remark]
     clock = mapping.clock_offset_ns
     with told(source):
         measurement = Measurement(
             echo=echo,
             uplinks=tuple(uplinks),
             waves=mapping.waves,
-            boresight=np.array(mapping.boresight),
+            boresight=boresight,
             clock_offset=None if clock is None else clock / 1e9,
             scenario=mapping.scenario or source.resolve().stem,
         )
     return Import(measurement=measurement, notes=tuple(dict.fromkeys(notes)))
+
+
+def _holds_arrays(mapping: SweepMapping) -> bool:
+    """Tell whether a folder holds files of arrays or text, by what the mapping says of them."""
+    signals = mapping.signals().values()
+    if any(table.parameter is not None for table in signals):
+        return False
+    patterns = [mapping.positions_of(table).files for table in signals]
+    return any(pattern is not None and FILES.search(pattern) for pattern in patterns) or any(
+        table.names_samples() or table.raw is not None for table in signals
+    )
 
 
 def _transmitters(reader: SignalReader, table: EchoTable, found: Signal) -> Positions | None:

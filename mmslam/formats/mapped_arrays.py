@@ -1,22 +1,20 @@
-"""Arrays of any axis order and unit, as a mapping tells them, brought to ours."""
+"""Arrays of any axis order, unit and kind of number, as a mapping tells them, brought to ours."""
 
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float, Num
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.array_files import ArrayFiles, is_csv
-from mmslam.formats.mapping import (
-    FREQUENCY,
-    FREQUENCY_UNITS,
-    GRID_AXES,
-    LENGTH_UNITS,
-    POSITION,
-    FrequencyTable,
-    PositionTable,
-    SamplesTable,
-)
+from mmslam.formats.tables.frequency_table import FrequencyTable
+from mmslam.formats.tables.signal_tables import SamplesTable
+from mmslam.formats.tables.sources import FREQUENCY_UNITS, SourceTable
+from mmslam.formats.time_domain.raw_numbers import raw_array
+
+POSITION = "position"
+GRID_AXES = ("x", "y", "z")
+"""Names of array axes: of a list of positions, and of a scan over a grid."""
 
 
 def array_frequencies(
@@ -32,15 +30,22 @@ def array_frequencies(
     if table.start is not None and table.stop is not None and table.points is not None:
         values = np.linspace(table.start, table.stop, table.points)
     else:
-        values = _line(path, table.variable, files.array(path, table.variable))
+        values = line_of(path, table.variable, files.array(path, table.variable))
     with np.errstate(over="ignore"):  # what overflows is refused as implausible
         return values * FREQUENCY_UNITS[table.unit]
 
 
 def array_samples(
-    files: ArrayFiles, path: Path, name: str, table: SamplesTable, points: int
-) -> tuple[Complex[np.ndarray, "positions freqs"], dict[str, int] | None]:
-    """Read complex samples and bring their axes to positions, frequencies.
+    files: ArrayFiles,
+    path: Path,
+    name: str,
+    table: SamplesTable,
+    *,
+    base: Path,
+    sweep: str,
+    points: int | None,
+) -> tuple[Num[np.ndarray, "positions points"], dict[str, int] | None]:
+    """Read samples and bring their axes to positions, sweep.
 
     Parameters
     ----------
@@ -52,200 +57,172 @@ def array_samples(
         The mapping's table, for messages.
     table
         Which variables, and the order of their axes.
+    base
+        Folder to which file names are relative.
+    sweep
+        The name of the axis along which each position was measured: frequency, time or sample.
     points
-        Number of frequencies.
+        Number of samples along it; None: any.
 
     Returns
     -------
-    The samples, and for a scan over a grid the length of each of its axes, in order.
+    The samples (complex; real ones as they are, over time and of a single mixer), and for a scan
+    over a grid the length of each of its axes, in order.
 
     Raises
     ------
     MeasurementError
-        If the axes do not fit the array.
+        If the axes do not fit the array, or real samples are not said to be.
     """
-    values = _complex(files, path, name, table)
-    axes = table.axes
-    if axes is None:
-        axes = [POSITION, FREQUENCY]
-        if values.ndim == 2 and values.shape[0] == values.shape[1] and not is_csv(path):
-            raise MeasurementError(
-                f"{path}: {name} has shape {values.shape}, and either axis could be the "
-                'frequency; give axes = ["position", "frequency"] or the other way round'
-            )
-    _check_axes(path, name, axes, table)
-    if values.ndim != len(axes) and axes == [FREQUENCY]:
-        values = np.squeeze(values)  # MATLAB has no vectors
-    if values.ndim != len(axes):
-        raise MeasurementError(
-            f"{path}: {name} has shape {values.shape}, but axes = {axes}; name each axis"
-        )
-    for axis, entry in table.take.items():
-        at = axes.index(axis)
-        if entry >= values.shape[at]:
-            raise MeasurementError(
-                f"{path}: {name}.take: {axis} = {entry}, but that axis has {values.shape[at]} "
-                f"entries; choose 0…{values.shape[at] - 1}"
-            )
-        values = np.take(values, entry, axis=at)
-        axes = [one for one in axes if one != axis]
-    places = [axis for axis in axes if axis != FREQUENCY]
-    count = values.shape[axes.index(FREQUENCY)]
-    if count != points:
+    reader = _Parts(files=files, path=path, name=name, table=table, base=base, sweep=sweep)
+    values, axes = reader.samples()
+    places = [axis for axis in axes if axis != sweep]
+    count = values.shape[axes.index(sweep)]
+    if points is not None and count != points:
         raise MeasurementError(
             f"{path}: {name} has shape {values.shape} with axes = {axes}, that is {count} "
-            f"frequencies, but there are {points}; correct axes in the mapping"
+            f"{'frequencies' if sweep == 'frequency' else f'{sweep}s'}, but there are {points}; "
+            "correct axes in the mapping"
         )
-    ordered = values.transpose([axes.index(axis) for axis in [*places, FREQUENCY]])
+    if values.dtype.kind != "c" and sweep == "frequency" and not table.analytic:
+        raise MeasurementError(
+            f"{path}: {name}: {table.variable or 'the array'!r} is real; give complex samples, or "
+            "name real and imaginary; for the beat of a single mixer set analytic = true, and for "
+            "traces over time give [time] instead of [frequency]"
+        )
+    ordered = values.transpose([axes.index(axis) for axis in [*places, sweep]])
     lengths = dict(zip(places, ordered.shape[:-1], strict=True))
-    flat = np.ascontiguousarray(ordered.reshape(-1, points), dtype=np.complex128)
-    return flat, None if places in ([POSITION], []) else lengths
+    kind = np.complex128 if values.dtype.kind == "c" else np.float64
+    flat = np.ascontiguousarray(ordered.reshape(-1, count), dtype=kind)
+    return flat * table.scale, None if places in ([POSITION], []) else lengths
 
 
-def array_positions(
-    files: ArrayFiles,
-    path: Path,
-    name: str,
-    table: PositionTable,
-    *,
-    count: int,
-    grid: dict[str, int] | None,
-) -> Float[np.ndarray, "positions 3"]:
-    """Read the positions, or make the line that the mapping gives. [m].
+class _Parts:
+    """The parts of samples (real, imaginary, …), each an array whose other axes are taken."""
 
-    Parameters
-    ----------
-    files
-        Where arrays are read from.
-    path
-        The file.
-    name
-        What they are, for messages.
-    table
-        Which variables, and in which unit.
-    count
-        How many positions the samples have.
-    grid
-        For a scan over a grid, the length of each of its axes, in order.
+    def __init__(
+        self,
+        *,
+        files: ArrayFiles,
+        path: Path,
+        name: str,
+        table: SamplesTable,
+        base: Path,
+        sweep: str,
+    ) -> None:
+        self._files, self._path, self._name = files, path, name
+        self._table, self._base, self._sweep = table, base, sweep
+
+    def samples(self) -> tuple[np.ndarray, list[str]]:
+        """Return the samples and the names of their axes."""
+        table, name = self._table, self._name
+        offset = table.offset if isinstance(table.offset, list) else [table.offset, table.offset]
+        if table.real is not None and table.imaginary is not None:
+            real, axes = self._real(table.real)
+            imaginary, other = self._real(table.imaginary)
+            _refuse_unequal(self._path, name, real, imaginary, axes == other)
+            return (real - offset[0]) + 1j * (imaginary - offset[1]), axes
+        magnitude = table.magnitude or table.magnitude_db
+        phase = table.phase_deg or table.phase_rad
+        if magnitude is not None and phase is not None:
+            size, axes = self._real(magnitude)
+            turn, other = self._real(phase)
+            _refuse_unequal(self._path, name, size, turn, axes == other)
+            with np.errstate(over="ignore"):  # what overflows is refused as implausible
+                size = 10 ** (size / 20) if table.magnitude_db else size
+            return size * np.exp(1j * (np.deg2rad(turn) if table.phase_deg else turn)), axes
+        values, axes = self._taken(SourceTable(variable=table.variable))
+        if values.dtype.kind == "c":
+            return values - complex(offset[0], offset[1]), axes
+        return values - offset[0] if offset[0] else values, axes
+
+    def _real(self, source: SourceTable) -> tuple[Float[np.ndarray, "..."], list[str]]:
+        values, axes = self._taken(source)
+        return real_array(self._path, source.variable, values), axes
+
+    def _taken(self, source: SourceTable) -> tuple[np.ndarray, list[str]]:
+        """Read an array and take its entry of each axis that is neither sweep nor position."""
+        path = self._path if source.file is None else self._base / source.file
+        name, table = self._name, self._table
+        if table.raw is not None:
+            values = raw_array(path, name, table.raw)
+        else:
+            values = self._files.array(path, source.variable, gaps=True)
+        axes = self._axes(path, values, source)
+        take = table.take | source.take
+        _check_axes(path, name, axes, take, self._sweep)
+        if values.ndim != len(axes) and axes == [self._sweep]:
+            values = np.squeeze(values)  # MATLAB has no vectors
+        if values.ndim != len(axes):
+            raise MeasurementError(
+                f"{path}: {name} has shape {values.shape}, but axes = {axes}; name each axis"
+            )
+        for axis, entry in take.items():
+            at = axes.index(axis)
+            if entry >= values.shape[at]:
+                raise MeasurementError(
+                    f"{path}: {name}.take: {axis} = {entry}, but that axis has {values.shape[at]} "
+                    f"entries; choose 0…{values.shape[at] - 1}"
+                )
+            values = np.take(values, entry, axis=at)
+            axes = [one for one in axes if one != axis]
+        return values, axes
+
+    def _axes(self, path: Path, values: np.ndarray, source: SourceTable) -> list[str]:
+        if self._table.axes is not None:
+            return list(self._table.axes)
+        table = is_csv(path) and source.variable is not None
+        if table and values.ndim == 1:  # a file of one position
+            return [self._sweep]
+        if values.ndim == 2 and values.shape[0] == values.shape[1] and not table:
+            raise MeasurementError(
+                f"{path}: {self._name} has shape {values.shape}, and either axis could be the "
+                f'{self._sweep}; give axes = ["position", "{self._sweep}"] or the other way round'
+            )
+        return [POSITION, self._sweep]
+
+
+def _check_axes(path: Path, name: str, axes: list[str], take: dict[str, int], sweep: str) -> None:
+    others = [axis for axis in axes if axis not in (POSITION, sweep, *GRID_AXES)]
+    scan = [axis for axis in axes if axis in GRID_AXES]
+    if len(set(axes)) < len(axes) or sweep not in axes or (POSITION in axes and scan):
+        raise MeasurementError(
+            f'{path}: {name}.axes = {axes}; give "{sweep}", and "position" or some of "x", "y" '
+            'and "z", each once'
+        )
+    if set(others) != set(take):
+        raise MeasurementError(
+            f"{path}: {name}.take = {take}, but the axes besides position and {sweep} are "
+            f"{others}; take one entry of each of them (for I and Q along an axis, real = "
+            "{ take = { iq = 0 } } and imaginary = { take = { iq = 1 } })"
+        )
+
+
+def line_of(path: Path, name: str | None, values: np.ndarray) -> Float[np.ndarray, " values"]:
+    """Return a row of real numbers, whatever axes of length 1 are around it.
 
     Raises
     ------
     MeasurementError
-        If there are more or fewer positions than samples have.
+        If it is complex, or more than one row.
     """
-    if table.files is not None or table.csv is not None:
-        raise MeasurementError(
-            f"{path}: {name}: files and csv tell the positions of a folder of Touchstone files; "
-            "for arrays give variable, x, y and z, or first and step"
-        )
-    if table.first is not None and table.step is not None:
-        values = np.array(table.first) + np.arange(count)[:, None] * np.array(table.step)
-    elif table.named_coordinates() or table.x is not None or table.y is not None or (
-        table.z is not None
-    ):  # fmt: skip
-        values = _coordinates(files, path, name, table, count, grid)
-    else:
-        values = _real(path, table.variable, files.array(path, table.variable))
-        if values.ndim == 2 and table.axes[0] == "axis":
-            values = values.T
-        if values.ndim != 2 or values.shape[1] != 3:
-            raise MeasurementError(
-                f"{path}: {name} have shape {values.shape} with axes = {table.axes}; they need "
-                "x, y and z: correct axes, or name the coordinates one by one by x, y and z"
-            )
-    if len(values) != count:
-        raise MeasurementError(
-            f"{path}: {name}: {len(values)} of them, but the samples have {count}; positions are "
-            "missing, or axes is wrong"
-        )
-    metres = (values - np.array(table.origin)) / LENGTH_UNITS[table.unit]
-    return np.ascontiguousarray(metres, dtype=np.float64)
-
-
-def _coordinates(
-    files: ArrayFiles,
-    path: Path,
-    name: str,
-    table: PositionTable,
-    count: int,
-    grid: dict[str, int] | None,
-) -> Float[np.ndarray, "places 3"]:
-    given = dict(zip(GRID_AXES, (table.x, table.y, table.z), strict=True))
-    lines = {
-        axis: _line(path, variable, files.array(path, variable))
-        for axis, variable in given.items()
-        if isinstance(variable, str)
-    }
-    constants = {axis: one for axis, one in given.items() if isinstance(one, int | float)}
-    if grid is not None:
-        for axis, length in grid.items():
-            if axis not in lines or lines[axis].size != length:
-                found = f"{lines[axis].size} values" if axis in lines else "no variable"
-                raise MeasurementError(
-                    f"{path}: {name}: {axis} has {found}, but the samples have {length} along "
-                    f"{axis!r}; name the variable of that length"
-                )
-        mesh = np.meshgrid(*(lines[axis] for axis in grid), indexing="ij")
-        lines |= {axis: one.ravel() for axis, one in zip(grid, mesh, strict=True)}
-    sizes = {axis: one.size for axis, one in lines.items()}
-    if len(set(sizes.values())) > 1:
-        raise MeasurementError(f"{path}: {name}: coordinates of unequal length ({sizes})")
-    values = np.zeros((next(iter(sizes.values()), count), 3))
-    for column, axis in enumerate(GRID_AXES):
-        values[:, column] = lines.get(axis, constants.get(axis, 0.0))
-    return values
-
-
-def _complex(files: ArrayFiles, path: Path, name: str, table: SamplesTable) -> np.ndarray:
-    if table.real is not None and table.imaginary is not None:
-        real = _real(path, table.real, files.array(path, table.real))
-        imaginary = _real(path, table.imaginary, files.array(path, table.imaginary))
-        _refuse_unequal(path, name, real, imaginary)
-        return real + 1j * imaginary
-    magnitude = table.magnitude or table.magnitude_db
-    phase = table.phase_deg or table.phase_rad
-    if magnitude is not None and phase is not None:
-        size = _real(path, magnitude, files.array(path, magnitude))
-        turn = _real(path, phase, files.array(path, phase))
-        _refuse_unequal(path, name, size, turn)
-        with np.errstate(over="ignore"):  # what overflows is refused as implausible
-            size = 10 ** (size / 20) if table.magnitude_db else size
-        return size * np.exp(1j * (np.deg2rad(turn) if table.phase_deg else turn))
-    values = files.array(path, table.variable)
-    if values.dtype.kind != "c":
-        raise MeasurementError(
-            f"{path}: {name}: {table.variable or 'the array'!r} is real; give complex samples, or "
-            "name real and imaginary"
-        )
-    return values
-
-
-def _check_axes(path: Path, name: str, axes: list[str], table: SamplesTable) -> None:
-    others = [axis for axis in axes if axis not in (POSITION, FREQUENCY, *GRID_AXES)]
-    scan = [axis for axis in axes if axis in GRID_AXES]
-    if len(set(axes)) < len(axes) or FREQUENCY not in axes or (POSITION in axes and scan):
-        raise MeasurementError(
-            f'{path}: {name}.axes = {axes}; give "frequency", and "position" or some of "x", "y" '
-            'and "z", each once'
-        )
-    if set(others) != set(table.take):
-        raise MeasurementError(
-            f"{path}: {name}.take = {table.take}, but the axes besides position and frequency are "
-            f"{others}; take one entry of each of them"
-        )
-
-
-def _line(path: Path, name: str | None, values: np.ndarray) -> Float[np.ndarray, " values"]:
-    numbers = np.atleast_1d(np.squeeze(_real(path, name, values)))  # MATLAB has no vectors
+    numbers = np.atleast_1d(np.squeeze(real_array(path, name, values)))  # MATLAB has no vectors
     if numbers.ndim != 1:
         raise MeasurementError(
             f"{path}: {name or 'the array'!r} has shape {values.shape}; it must be one row of "
-            "numbers"
+            "numbers; of a mesh of coordinates, name the grid by the samples' axes"
         )
     return numbers
 
 
-def _real(path: Path, name: str | None, values: np.ndarray) -> Float[np.ndarray, "..."]:
+def real_array(path: Path, name: str | None, values: np.ndarray) -> Float[np.ndarray, "..."]:
+    """Return an array as real numbers.
+
+    Raises
+    ------
+    MeasurementError
+        If it is complex.
+    """
     if values.dtype.kind == "c":
         raise MeasurementError(
             f"{path}: {name or 'the array'!r} is complex; real numbers are needed here"
@@ -253,8 +230,10 @@ def _real(path: Path, name: str | None, values: np.ndarray) -> Float[np.ndarray,
     return values.astype(np.float64)
 
 
-def _refuse_unequal(path: Path, name: str, one: np.ndarray, other: np.ndarray) -> None:
-    if one.shape != other.shape:
+def _refuse_unequal(
+    path: Path, name: str, one: np.ndarray, other: np.ndarray, same_axes: bool
+) -> None:
+    if one.shape != other.shape or not same_axes:
         raise MeasurementError(
             f"{path}: {name}: its two parts have shapes {one.shape} and {other.shape}; they must "
             "be equal"

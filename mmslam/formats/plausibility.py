@@ -7,9 +7,12 @@ from scipy.spatial import cKDTree
 
 from estimator.measurement.model import MeasurementError
 
-LOWEST, HIGHEST = 1e9, 1e13
-"""Frequencies of radios that measure rooms to millimetres: 220 in GHz, taken for Hz, lies far
-below; 220e9 in Hz, taken for GHz, far above. [Hz]"""
+LOWEST, HIGHEST = 1e7, 1e13
+"""Frequencies of radios that make images: antennas of ground-penetrating radar begin at 10 MHz; 220
+in GHz, taken for Hz, lies far below; 220e9 in Hz, taken for GHz, far above. [Hz]"""
+
+UNUSUAL = 1e9
+"""Below this the frequencies are remarked: of ground-penetrating radar, or in a wrong unit. [Hz]"""
 
 WIDEST = 20.0
 """Largest aperture: 130 mm taken for metres lie far above. [m]"""
@@ -21,8 +24,8 @@ STRONGEST = 1.0
 """Largest magnitude that a passive link can have, an S-parameter. [-]"""
 
 
-LARGEST_SAMPLE = 1e6
-"""Largest magnitude that is read: 120 dB above a passive link, or a damaged number. [-]"""
+LARGEST_SAMPLE = 2.0**32
+"""Largest magnitude that is read: counts of a 32-bit converter; more is a damaged number. [-]"""
 
 FARTHEST = 1000.0
 """Largest coordinate; beyond, phases at 1 THz lose 1e-6 rad in double precision. [m]"""
@@ -39,13 +42,15 @@ def check_samples(name: str, samples: Complex[np.ndarray, "positions freqs"]) ->
     largest = max(float(np.abs(samples.real).max()), float(np.abs(samples.imag).max()))
     if not largest <= LARGEST_SAMPLE:
         raise MeasurementError(
-            f"{name}: samples reach {largest:.3g}; an S-parameter is at most {LARGEST_SAMPLE:.0e}: "
-            "the file may be damaged, or the mapping names another variable"
+            f"{name}: samples reach {largest:.3g}; counts of a converter are at most "
+            f"{LARGEST_SAMPLE:.3g}: the file may be damaged, or the mapping names another variable"
         )
 
 
-def check_frequencies(name: str, frequencies: Float[np.ndarray, " freqs"], remedy: str) -> None:
-    """Refuse frequencies at which no such radio works.
+def check_frequencies(
+    name: str, frequencies: Float[np.ndarray, " freqs"], remedy: str
+) -> str | None:
+    """Refuse frequencies at which no such radio works; remark those of few.
 
     Raises
     ------
@@ -58,6 +63,9 @@ def check_frequencies(name: str, frequencies: Float[np.ndarray, " freqs"], remed
             f"{name}: frequencies {low:.6g} … {high:.6g} Hz; they must be {LOWEST:.0e} … "
             f"{HIGHEST:.0e} Hz: {remedy}"
         )
+    if low < UNUSUAL:
+        return f"{name}: frequencies from {low:.6g} Hz, below 1 GHz; if that is unusual, {remedy}"
+    return None
 
 
 def check_positions(
@@ -67,7 +75,8 @@ def check_positions(
     *,
     any_size: bool,
     remedy: str,
-) -> None:
+    counted: bool = False,
+) -> str | None:
     """Refuse an array larger, sparser or smaller than any that could be imaged with.
 
     Parameters
@@ -82,6 +91,12 @@ def check_positions(
         Accept any extent and spacing.
     remedy
         Which key to change, for the message.
+    counted
+        The coordinates rise by one, as indices do: a small extent is remarked, not refused.
+
+    Returns
+    -------
+    A remark, if the array is too small and its coordinates look like indices.
 
     Raises
     ------
@@ -96,7 +111,7 @@ def check_positions(
             "unit and the origin of [positions] right"
         )
     if len(positions) < 2 or any_size:
-        return
+        return None
     extent = float(np.ptp(positions, axis=0).max())
     # The first neighbour of a point is the point itself.
     distances = np.asarray(cKDTree(positions).query(positions, k=2)[0])
@@ -114,7 +129,12 @@ def check_positions(
             f"they must be at most {SPARSEST:g} wavelengths apart"
         )
     else:
-        return
+        return None
+    if counted and extent < shortest_wave:
+        return (
+            f"{name}: {reason}; the numbers in the file names rise by one: if they count steps, "
+            "give first and step in [positions]"
+        )
     raise MeasurementError(f"{name}: {reason}: {remedy}")
 
 
@@ -125,7 +145,7 @@ def strength_note(name: str, samples: Complex[np.ndarray, "positions freqs"]) ->
         return None
     return (
         f"{name}: samples reach |S| = {strongest:.4g}; a passive link stays below 1: are they in "
-        "decibels, or amplified?"
+        "decibels, amplified, or counts of a converter (scale brings them to S-parameters)?"
     )
 
 

@@ -1,6 +1,10 @@
-"""A folder of Touchstone files, one for each position: which files, and where each was taken."""
+"""A folder of files, one for each position: which files, and where each was taken.
+
+Touchstone files are read here; files of arrays or text by :mod:`mmslam.formats.array_reader`.
+"""
 
 import csv
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +13,8 @@ from jaxtyping import Complex, Float
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.file_pattern import expression_of_pattern, fields_of_pattern
-from mmslam.formats.mapping import LENGTH_UNITS, PositionTable
+from mmslam.formats.tables.position_table import PositionTable
+from mmslam.formats.tables.sources import LENGTH_UNITS
 from mmslam.formats.touchstone_files import SUFFIX, Sweep, read_touchstone
 
 COORDINATES = ("x", "y", "z")
@@ -30,7 +35,8 @@ class FolderList:
     files: tuple[Path, ...]
     positions: Float[np.ndarray, "positions 3"]  # [m]
     transmit_positions: Float[np.ndarray, "positions 3"] | None  # None: not listed [m]
-    ignored: tuple[str, ...]  # Touchstone files of the folder that do not belong to the scan
+    ignored: tuple[str, ...]  # files of the folder, of that kind, that do not belong to the scan
+    counted: bool = False  # the numbers in the names rise by one, as indices do
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +59,9 @@ class Scan:
         return np.ascontiguousarray(self.samples[..., out - 1, into - 1])
 
 
-def list_folder(folder: Path, table: PositionTable, *, base: Path) -> FolderList:
+def list_folder(
+    folder: Path, table: PositionTable, *, base: Path, suffix: re.Pattern[str] = SUFFIX
+) -> FolderList:
     """Find the files of a scan and their positions.
 
     Parameters
@@ -65,6 +73,8 @@ def list_folder(folder: Path, table: PositionTable, *, base: Path) -> FolderList
     base
         The folder of the mapping file, to which the list's name is relative; a list that is
         not there is looked for in ``folder``.
+    suffix
+        Which files may belong to the scan: Touchstone files, or others.
 
     Raises
     ------
@@ -72,15 +82,15 @@ def list_folder(folder: Path, table: PositionTable, *, base: Path) -> FolderList
         If there is no such file, a listed one is missing, or positions cannot be told.
     """
     if not folder.is_dir():
-        raise MeasurementError(f"{folder}: no such folder; give the folder of Touchstone files")
+        raise MeasurementError(f"{folder}: no such folder; give the folder of the sweeps")
     if table.csv is not None:
-        return _listed(folder, _list_file(folder, base, table.csv), table)
+        return _listed(folder, _list_file(folder, base, table.csv), table, suffix)
     if table.files is None:
         raise MeasurementError(
-            f"{folder}: a folder of Touchstone files needs positions.files (a pattern) or "
+            f"{folder}: a folder of files, one for each position, needs positions.files (a pattern) or "
             "positions.csv (a list); give one"
         )
-    return _matched(folder, table.files, table)
+    return _matched(folder, table.files, table, suffix)
 
 
 def read_scan(files: tuple[Path, ...]) -> Scan:
@@ -132,18 +142,21 @@ def _check_alike(path: Path, sweep: Sweep, first_path: Path, first: Sweep) -> No
         )
 
 
-def _matched(folder: Path, pattern: str, table: PositionTable) -> FolderList:
+def _matched(
+    folder: Path, pattern: str, table: PositionTable, suffix: re.Pattern[str]
+) -> FolderList:
     fields = fields_of_pattern(pattern)
-    names = sorted(entry.name for entry in folder.iterdir() if SUFFIX.search(entry.name))
+    names = sorted(entry.name for entry in folder.iterdir() if suffix.search(entry.name))
     expression = expression_of_pattern(pattern)
     matches = {name: match for name in names if (match := expression.fullmatch(name))}
     if not matches:
         raise MeasurementError(
-            f"{folder}: none of its {len(names)} Touchstone files fits files = {pattern!r}"
+            f"{folder}: none of its {len(names)} {'Touchstone ' if suffix is SUFFIX else ''}files fits files = {pattern!r}"
             + (f" (the first is {names[0]!r})" if names else "")
             + "; correct the pattern"
         )
     ignored = tuple(name for name in names if name not in matches)
+    counted = False
     if "index" in fields:
         indices = {name: int(match["index"]) for name, match in matches.items()}
         ordered, positions = _along_line(folder, indices, table)
@@ -156,14 +169,26 @@ def _matched(folder: Path, pattern: str, table: PositionTable) -> FolderList:
         )
         order = np.lexsort(places.T)  # x fastest, as a scanner moves
         ordered = [list(matches)[index] for index in order]
-        positions = _metres(places[order], table)
+        places = places[order]
+        if table.first is not None and table.step is not None:  # the numbers count steps
+            places = np.array(table.first) + np.array(table.step) * places
+        else:
+            counted = _count(places)
+        positions = _metres(places, table)
     _refuse_twice(folder, ordered, positions)
     return FolderList(
         files=tuple(folder / name for name in ordered),
         positions=positions,
         transmit_positions=None,
         ignored=ignored,
+        counted=counted,
     )
+
+
+def _count(places: Float[np.ndarray, "positions 3"]) -> bool:
+    """Tell whether the numbers along each axis are whole and rise by one."""
+    axes = [np.unique(column) for column in places.T]
+    return all(bool(np.all(axis == np.round(axis)) and np.all(np.diff(axis) == 1)) for axis in axes)
 
 
 def _along_line(
@@ -193,7 +218,7 @@ def _list_file(folder: Path, base: Path, name: str) -> Path:
     )
 
 
-def _listed(folder: Path, path: Path, table: PositionTable) -> FolderList:
+def _listed(folder: Path, path: Path, table: PositionTable, suffix: re.Pattern[str]) -> FolderList:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.DictReader(stream, skipinitialspace=True)
@@ -218,7 +243,7 @@ def _listed(folder: Path, path: Path, table: PositionTable) -> FolderList:
         sorted(
             entry.name
             for entry in folder.iterdir()
-            if SUFFIX.search(entry.name) and entry.resolve() not in listed
+            if suffix.search(entry.name) and entry.resolve() not in listed
         )
     )
     return FolderList(

@@ -11,9 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from estimator.measurement.model import MeasurementError
-
-COMMENT = "#"
-DELIMITERS = ",;\t"
+from mmslam.formats.text.text_numbers import read_columns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +35,7 @@ def read_csv_grid(path: Path, *, frequency: str | None, coordinates: tuple[str, 
     Parameters
     ----------
     path
-        The file: a header line, then numbers, separated by commas, semicolons or tabs; lines
-        that begin with ``#`` are left out.
+        The file: names of the columns, then numbers; see :mod:`.text_numbers`.
     frequency
         The column of the frequency, if there is one.
     coordinates
@@ -49,7 +46,8 @@ def read_csv_grid(path: Path, *, frequency: str | None, coordinates: tuple[str, 
     MeasurementError
         If it is no such file, a number is missing, or the rows fill no grid.
     """
-    names, values = _columns(path)
+    table = read_columns(path)
+    names, values = table.names, table.values
     columns = dict(zip(names, values.T, strict=True))
     keys = [name for name in coordinates if name in columns]
     where = np.zeros(len(values), dtype=np.int64)
@@ -75,49 +73,6 @@ def read_csv_grid(path: Path, *, frequency: str | None, coordinates: tuple[str, 
         if name not in arrays:
             arrays[name] = column[cell].reshape(shape)
     return CsvGrid(path=path, arrays=arrays)
-
-
-def _columns(path: Path) -> tuple[list[str], Float[np.ndarray, "rows columns"]]:
-    try:
-        with path.open(encoding="utf-8-sig") as stream:
-            header = next((line for line in stream if line.strip() and line[0] != COMMENT), "")
-            delimiter = max(DELIMITERS, key=header.count)
-            names = [name.strip().strip('"') for name in header.split(delimiter)]
-            if len(set(names)) < len(names) or not all(names) or _is_number(names[0]):
-                raise MeasurementError(
-                    f"{path}: the first line is {header.strip()[:80]!r}; it must name the columns, "
-                    "each once"
-                )
-            values = np.loadtxt(stream, delimiter=delimiter, comments=COMMENT, ndmin=2)
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementError(f"{path}: cannot be read as text ({error})") from None
-    except ValueError as error:
-        if isinstance(error, MeasurementError):
-            raise
-        raise MeasurementError(
-            f"{path}: {error} (rows are counted after the header); give a number in every column"
-        ) from None
-    if values.shape[1] != len(names):
-        raise MeasurementError(
-            f"{path}: {len(names)} columns in the header, {values.shape[1]} in the rows; it may "
-            "be truncated"
-        )
-    bad = ~np.isfinite(values)
-    if bad.any():
-        row, column = np.argwhere(bad)[0]
-        raise MeasurementError(
-            f"{path}: row {row + 1} after the header: {names[column]} is {values[row, column]}; "
-            "measure again or remove that position"
-        )
-    return names, values
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _by_appearance(

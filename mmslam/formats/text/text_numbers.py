@@ -1,0 +1,219 @@
+"""Numbers in a text file, and the names of its columns, as programs and instruments write them.
+
+Read are RFC 4180 (quoted names with commas in them), semicolons with decimal commas, tabs and
+blanks, names in a remark above the numbers (CST), and files without names.
+"""
+
+import csv
+import io
+import itertools
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.measurement.model import MeasurementError
+
+REMARKS = "#%!"
+"""Signs at a line's begin that make it a remark."""
+
+LARGEST_TEXT = 2**30
+"""Largest text file that is read [byte]."""
+
+_DELIMITERS = (",", ";", "\t", None)  # None: any number of blanks
+_RULE = re.compile(r"[-=_\s]*")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextColumns:
+    """The columns of a text file; without names of their own they are called 0, 1, 2, …."""
+
+    names: list[str]
+    values: Float[np.ndarray, "rows columns"]
+
+
+def read_columns(path: Path) -> TextColumns:
+    """Read a table of real numbers.
+
+    Raises
+    ------
+    MeasurementError
+        If it is no text, a column has no name of its own, or a number is missing.
+    """
+    head, body = _split(_text(path))
+    first = body.split("\n", 1)[0]
+    delimiter, decimal_comma = _delimiter(head, first)
+    names = _names(path, head, delimiter, len(_fields(first, delimiter)))
+    if not body.strip():
+        raise MeasurementError(f"{path}: no row of numbers after the header; it may be truncated")
+    try:
+        values = np.loadtxt(
+            io.StringIO(body.replace(",", ".") if decimal_comma else body),
+            delimiter=delimiter, comments=list(REMARKS), quotechar='"', ndmin=2,
+        )  # fmt: skip
+    except ValueError as error:
+        raise MeasurementError(
+            f"{path}: {error} (rows are counted after the header); give a number in every column"
+        ) from None
+    if values.shape[1] != len(names):
+        raise MeasurementError(
+            f"{path}: {len(names)} columns in the header, {values.shape[1]} in the rows; it may "
+            "be truncated"
+        )
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        raise MeasurementError(
+            f"{path}: row {row + 1} after the header: {names[column]} is {values[row, column]}; "
+            "measure again or remove that position"
+        )
+    return TextColumns(names=names, values=values)
+
+
+def read_matrix(path: Path) -> np.ndarray:
+    """Read a matrix of real or complex numbers (``1.5-2j``, ``1.5-2i``) without any names.
+
+    Raises
+    ------
+    MeasurementError
+        If it is no text, or its lines are no rows of numbers.
+    """
+    head, body = _split(_text(path))
+    if head and not head[-1].startswith(tuple(REMARKS)):
+        raise MeasurementError(
+            f"{path}: the first line is {head[-1][:80]!r}, names of columns; name one by variable"
+        )
+    if not body.strip():
+        raise MeasurementError(f"{path}: no row of numbers; it may be truncated")
+    first = body.split("\n", 1)[0]
+    delimiter, decimal_comma = _delimiter([], first)
+    stream = io.StringIO(body.replace(",", ".") if decimal_comma else body)
+    complex_numbers = not all(_is_number(field) for field in _fields(first, delimiter))
+    try:
+        if complex_numbers:
+            return np.loadtxt(
+                stream, delimiter=delimiter, comments=list(REMARKS), dtype=np.complex128,
+                converters=_complex, ndmin=2,
+            )  # fmt: skip
+        return np.loadtxt(stream, delimiter=delimiter, comments=list(REMARKS), ndmin=2)
+    except ValueError as error:
+        raise MeasurementError(f"{path}: {error}; every line must be a row of numbers") from None
+
+
+def _text(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_TEXT:
+            raise MeasurementError(
+                f"{path}: {size} bytes are more than {LARGEST_TEXT}; save it as .npy, or import "
+                "in parts"
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MeasurementError(f"{path}: cannot be read as text ({error})") from None
+
+
+def _split(text: str) -> tuple[list[str], str]:
+    """Separate what stands above the numbers (remarks, perhaps names) from them."""
+    stream = io.StringIO(text)
+    head = []
+    for line in stream:
+        if not line.strip():
+            continue
+        if line[0] in REMARKS:
+            head.append(line.strip())
+            continue
+        rest = stream.read()
+        if any(_is_row(line, delimiter) for delimiter in _DELIMITERS):
+            return head, line + rest
+        return [*head, line.strip()], rest.lstrip("\r\n")
+    return head, ""
+
+
+def _delimiter(head: list[str], first: str) -> tuple[str | None, bool]:
+    for delimiter in _DELIMITERS:
+        fields = _fields(first, delimiter)
+        named = _header(head, delimiter, len(fields)) if head else None
+        fits = named is not None or not head or head[-1].startswith(tuple(REMARKS))
+        if len(fields) > 1 and fits and all(_is_number(one) or _is_complex(one) for one in fields):
+            return delimiter, False
+    for delimiter in (";", "\t", None):  # where a comma is the decimal sign
+        fields = _fields(first, delimiter)
+        if "," in first and all(_is_number(one.replace(",", ".")) for one in fields):
+            return delimiter, True
+    names = head[-1] if head else first
+    return max((",", ";", "\t"), key=names.count), False
+
+
+def _names(path: Path, head: list[str], delimiter: str | None, count: int) -> list[str]:
+    if not head:
+        if not count:
+            raise _nameless(path, "")
+        return [str(column) for column in range(count)]
+    if not head[-1].startswith(tuple(REMARKS)):  # a line of names
+        names = [name.strip().strip('"') for name in _fields(head[-1], delimiter)]
+        if len(set(names)) < len(names) or not all(names):
+            raise _nameless(path, head[-1])
+        return names
+    return _header(head, delimiter, count) or [str(column) for column in range(count)]
+
+
+def _header(head: list[str], delimiter: str | None, count: int) -> list[str] | None:
+    """Find the names in the lines above the numbers: the last that has one for each column."""
+    for line in reversed(head):
+        text = line.lstrip(REMARKS).strip()
+        if _RULE.fullmatch(text):
+            continue
+        names = [name.strip() for name in _fields(text, delimiter)]
+        if len(names) == count and len(set(names)) == count and all(names):
+            return names
+    return None
+
+
+def _fields(line: str, delimiter: str | None) -> list[str]:
+    line = line.strip("\r\n") if delimiter == "\t" else line.strip()
+    if not line:
+        return []
+    if delimiter is None:
+        blanks = re.sub(r"\s+", " ", line)
+        return next(csv.reader([blanks], delimiter=" "))
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:
+        return line.split(delimiter)
+
+
+def _is_row(line: str, delimiter: str | None) -> bool:
+    fields = _fields(line, delimiter)
+    return bool(fields) and all(
+        _is_number(one.replace(",", ".")) or _is_complex(one) for one in fields
+    )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_complex(text: str) -> bool:
+    try:
+        _complex(text)
+    except ValueError:
+        return False
+    return any(sign.isdigit() for sign in text)
+
+
+def _complex(text: str) -> complex:
+    plain = "".join(itertools.chain(text.split()))
+    return complex(plain[:-1] + "j" if plain.endswith("i") else plain)
+
+
+def _nameless(path: Path, line: str) -> MeasurementError:
+    return MeasurementError(
+        f"{path}: the first line is {line[:80]!r}; it must name the columns, each once"
+    )
