@@ -21,6 +21,7 @@ from mmslam.formats.measured_signals import (
     measured_positions,
     signed,
 )
+from mmslam.formats.plausibility import check_frequencies
 from mmslam.formats.tables.position_table import PositionTable
 from mmslam.formats.tables.signal_tables import (
     REPRESENTATION,
@@ -212,7 +213,10 @@ class ArrayReader:
     def _frequencies(self, source: Path) -> Frequencies:
         table = self._mapping.frequency
         assert table is not None  # asked for where it is given only
-        return array_frequencies(self._files, self._path(table.file, source), table)
+        path = self._path(table.file, source)
+        found = array_frequencies(self._files, path, table)
+        check_frequencies(str(path), found, f"[frequency] unit = {table.unit!r} may be wrong")
+        return found
 
     def _times(self, source: Path) -> TraceTimes:
         table = self._mapping.time

@@ -15,6 +15,10 @@ ROUNDING = 0.05
 unambiguous delay, one over the step, it turns the phase by 18°; of a grid of other frequencies it
 would move targets. [-]"""
 
+NEARLY = 1e-3
+"""Largest departure from equal steps, in steps, that is taken for a rounding without being told:
+the phase at the end of the unambiguous delay is wrong by 2π of it, −44 dB. [-]"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class OrderedSweep:
@@ -111,6 +115,16 @@ def _equal(
     try:
         frequency_step(frequencies)
     except MeasurementError:
+        if away <= NEARLY * step:
+            error_db = 20 * np.log10(2 * np.pi * away / step)
+            return (
+                samples,
+                even,
+                (
+                    f"the frequency steps are not quite uniform (up to {away:.3g} Hz off) and "
+                    f"taken for equal ones, with an error of at most {error_db:.0f} dB"
+                ),
+            )
         found = to_equal_steps(samples, frequencies)
     else:
         return samples, frequencies, None

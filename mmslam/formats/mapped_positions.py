@@ -126,8 +126,9 @@ def _coordinates(
     for axis in grid or {}:
         if axis not in lines:
             raise MeasurementError(
-                f"{path}: {name}: {axis} has no variable, but the samples have {grid} along their "
-                "axes; name the variable of that length, or give first and step"
+                f"{path}: {name}: {axis} has no variable, but the samples have "
+                f"{(grid or {})[axis]} along {axis!r}; name the variable of that length, or give "
+                "first and step"
             )
     sizes = {axis: one.size for axis, one in lines.items()}
     if len(set(sizes.values())) > 1:

@@ -87,8 +87,8 @@ def list_folder(
         return _listed(folder, _list_file(folder, base, table.csv), table, suffix)
     if table.files is None:
         raise MeasurementError(
-            f"{folder}: a folder of files, one for each position, needs positions.files (a pattern) or "
-            "positions.csv (a list); give one"
+            f"{folder}: a folder of files, one for each position, needs positions.files (a "
+            "pattern) or positions.csv (a list); give one"
         )
     return _matched(folder, table.files, table, suffix)
 
@@ -150,8 +150,9 @@ def _matched(
     expression = expression_of_pattern(pattern)
     matches = {name: match for name in names if (match := expression.fullmatch(name))}
     if not matches:
+        kind = "Touchstone files" if suffix is SUFFIX else "files of arrays or text"
         raise MeasurementError(
-            f"{folder}: none of its {len(names)} {'Touchstone ' if suffix is SUFFIX else ''}files fits files = {pattern!r}"
+            f"{folder}: none of its {len(names)} {kind} fits files = {pattern!r}"
             + (f" (the first is {names[0]!r})" if names else "")
             + "; correct the pattern"
         )

@@ -51,7 +51,7 @@ def read_columns(path: Path) -> TextColumns:
     try:
         values = np.loadtxt(
             io.StringIO(body.replace(",", ".") if decimal_comma else body),
-            delimiter=delimiter, comments=list(REMARKS), quotechar='"', ndmin=2,
+            delimiter=delimiter, comments=REMARKS[0], quotechar='"', ndmin=2,
         )  # fmt: skip
     except ValueError as error:
         raise MeasurementError(
@@ -94,10 +94,10 @@ def read_matrix(path: Path) -> np.ndarray:
     try:
         if complex_numbers:
             return np.loadtxt(
-                stream, delimiter=delimiter, comments=list(REMARKS), dtype=np.complex128,
+                stream, delimiter=delimiter, comments=REMARKS[0], dtype=np.complex128,
                 converters=_complex, ndmin=2,
             )  # fmt: skip
-        return np.loadtxt(stream, delimiter=delimiter, comments=list(REMARKS), ndmin=2)
+        return np.loadtxt(stream, delimiter=delimiter, comments=REMARKS[0], ndmin=2)
     except ValueError as error:
         raise MeasurementError(f"{path}: {error}; every line must be a row of numbers") from None
 
@@ -125,7 +125,7 @@ def _split(text: str) -> tuple[list[str], str]:
         if line[0] in REMARKS:
             head.append(line.strip())
             continue
-        rest = stream.read()
+        rest = "".join(one for one in stream if not one.startswith(tuple(REMARKS)))
         if any(_is_row(line, delimiter) for delimiter in _DELIMITERS):
             return head, line + rest
         return [*head, line.strip()], rest.lstrip("\r\n")

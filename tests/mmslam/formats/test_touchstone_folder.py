@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from estimator.measurement.model import MeasurementError
-from mmslam.formats.mapping import PositionTable, SweepMapping
+from mmslam.formats.mapping import SweepMapping
 from mmslam.formats.measured_signals import FolderReader
+from mmslam.formats.tables.position_table import PositionTable
 from mmslam.formats.touchstone_files import read_touchstone, touchstone_text
 from mmslam.formats.touchstone_folder import list_folder, read_scan
 
