@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from scenes.schema.antenna import Isotropic
 from simulator.antennas.antenna_pattern import AntennaPattern
 
 LEVEL = 1e-3
@@ -44,9 +45,13 @@ class AntennaGroup:
         return np.concatenate([corners, self.centre[None]])
 
     def at_most(
-        self, centres: Float[np.ndarray, "spheres 3"], radius: float
+        self,
+        centres: Float[np.ndarray, "spheres 3"],
+        radius: float | Float[np.ndarray, " spheres"],
     ) -> Float[np.ndarray, " spheres"]:
         """Bound the field of any of the antennas anywhere in spheres, over that on axis. [-]."""
+        if isinstance(self.pattern.antenna, Isotropic):
+            return np.ones(len(centres))
         most = np.zeros(len(centres))
         for place in self.outline:
             towards = centres - place
@@ -78,7 +83,10 @@ def in_reach(
     """
     reached = np.zeros(len(centres), dtype=bool)
     for one, other in pairs:
-        bound = one.at_most(centres, radius)
-        bound = bound * (bound if one is other else other.at_most(centres, radius))
-        reached |= bound >= level
+        left = np.flatnonzero(~reached)
+        if left.size == 0:
+            break
+        bound = one.at_most(centres[left], radius)
+        bound = bound * (bound if one is other else other.at_most(centres[left], radius))
+        reached[left] = bound >= level
     return reached

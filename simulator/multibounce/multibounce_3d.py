@@ -17,7 +17,6 @@ chains of two targets of which the earlier is curved.
 
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -84,12 +83,13 @@ def coherent_echo(
         own = among.of(name)
         legs = [DIRECT, *(leg for leg in among.legs if not own.intersection(leg.sequence))]
         target = _Target(scene, among.mirrors, facets, send, receive)
-        for out, back in product(range(len(legs)), repeat=2):
+        bounces = np.array([leg.bounces for leg in legs])
+        together = bounces[:, None] + bounces
+        wanted = (together >= 1) & (together <= most)
+        if send is receive:  # the same way the other way round
+            wanted = np.triu(wanted)
+        for out, back in np.argwhere(wanted).tolist():
             pair = legs[out], legs[back]
-            if not 1 <= pair[0].bounces + pair[1].bounces <= most:
-                continue
-            if send is receive and out > back:  # the same way the other way round
-                continue
             # Met at the other end of the chain, too: cut there, if that target is the later one.
             ends = [leg.sequence[0] for leg in pair if leg.sequence]
             other = among.owners[ends[0]]

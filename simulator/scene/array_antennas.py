@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import product
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -65,11 +64,11 @@ def needed_reach(
     array = array_group(scenario, elements)
     send = sending_group(scenario, elements) or array
     most = scenario.max_bounces - 1
-    pairs = [
-        (out.image(send), back.image(array))
-        for out, back in product((DIRECT, *legs), repeat=2)
-        if out.bounces + back.bounces <= most
-    ]
+    ways = (DIRECT, *legs)
+    outward, homeward = ([leg.image(group) for leg in ways] for group in (send, array))
+    bounces = np.array([leg.bounces for leg in ways])
+    chosen = np.argwhere(bounces[:, None] + bounces <= most).tolist()
+    pairs = [(outward[out], homeward[back]) for out, back in chosen]
     users = [user_group(scenario, name) for name in scenario.users]
     pairs += [(user, array) for user in users]
     over_several = []

@@ -98,14 +98,12 @@ def legs_within_reach(
     radii = np.linalg.norm(mirrors.corners - centres[:, None], axis=-1).max(axis=1)
 
     def grown(leg: Leg) -> Iterator[Leg]:
-        for mirror in range(len(mirrors)):
+        images = [leg.image(group) for group in groups]
+        bounds = np.max([image.at_most(centres, radii) for image in images], axis=0)
+        for mirror in np.flatnonzero(bounds >= LEVEL).tolist():
             if leg.sequence and leg.sequence[-1] == mirror:
                 continue
-            images = [leg.image(group) for group in groups]
-            bounds = [i.at_most(centres[mirror : mirror + 1], float(radii[mirror])) for i in images]
-            if max(float(bound[0]) for bound in bounds) >= LEVEL and any(
-                _reflects(mirrors, mirror, image) for image in images
-            ):
+            if any(_reflects(mirrors, mirror, image) for image in images):
                 yield leg.onward(mirrors, mirror)
 
     found: list[Leg] = []

@@ -58,7 +58,8 @@ def test_an_exported_folder_can_be_moved_and_simulates_the_same(tmp_path: Path) 
     given = tmp_path / "given"
     given.mkdir()
     (given / "board.csv").write_text("frequency_ghz,eps_real,eps_imag\n200,2.5,0.1\n300,2.6,0.1\n")
-    cuts = ["radio.points=21", "base_station.elements=[3, 3]"]
+    cuts = ["radio.points=5", "base_station.elements=[2, 2]", "max_bounces=1"]
+    cuts += ["objects.letter.scale=0.2", "objects.sphere.scale=0.0012"]
     cuts += [f"objects.letter.material={{file = '{given}/board.csv', thickness_mm = 3}}"]
     options = [part for cut in cuts for part in ("--set", cut)]
     code, listed, message = mmslam("scenes", "bench_3d", *options, "--export", "first")

@@ -111,10 +111,13 @@ def test_the_range_bound_of_the_slam_scene_is_0_03_micrometres_at_40_db() -> Non
     assert np.sqrt(bound[1, 1]) == pytest.approx(textbook, rel=2e-3)  # 1001 points, not infinite
 
 
+MANY = pytest.param(2000, marks=pytest.mark.slow)  # a minute each
+
+
+@pytest.mark.parametrize("trials", [200, MANY])
 @pytest.mark.parametrize("snr_db", [10.0, 40.0])
-def test_refinement_reaches_the_bound_without_bias(snr_db: float) -> None:
+def test_refinement_reaches_the_bound_without_bias(snr_db: float, trials: int) -> None:
     rng = np.random.default_rng(int(snr_db))
-    trials = 2000
     positions, frequencies = linear_array(16), np.linspace(220e9, 295e9, 24)
     truth = np.array([np.radians(70.0), 0.4])
     wave = spherical_wave(np.array([*truth, 1.0, 0.0]), positions, frequencies)
@@ -136,11 +139,11 @@ def test_refinement_reaches_the_bound_without_bias(snr_db: float) -> None:
     )
     ratio = errors.var(axis=0) / np.diag(bound)
     bias = np.abs(errors.mean(axis=0)) / np.sqrt(np.diag(bound))
-    # The bounds. A variance of 2000 trials scatters by 3 %: 1.15 is over 4 deviations
-    # away, and not below the bound by more than that; a mean scatters by 0.022 deviations.
-    assert np.all(ratio < 1.15)
+    # What was asked, 1.15 and 0.1, or four deviations of so many trials if these are more: of 2000,
+    # a variance scatters by 3 % and a mean by 0.022 deviations.
+    assert np.all(ratio < 1 + max(0.15, 4 * np.sqrt(2 / trials)))
     assert np.all(ratio > 1 - 4 * np.sqrt(2 / trials))
-    assert np.all(bias < 0.1)
+    assert np.all(bias < max(0.1, 4 / np.sqrt(trials)))
 
 
 def test_the_reported_covariance_is_that_of_the_bound() -> None:
