@@ -60,7 +60,9 @@ def simulate(scenario: Scenario, *, seed: int = 0, progress: Progress | None = N
     return Measurement.of(found.measurement, beside=found.truth)
 
 
-def locate(measurement: model.Measurement, *, progress: Progress | None = None) -> Estimate:
+def locate(
+    measurement: model.Measurement, *, images: bool = True, progress: Progress | None = None
+) -> Estimate:
     """Find walls, targets and users from a measurement alone.
 
     Parameters
@@ -68,6 +70,9 @@ def locate(measurement: model.Measurement, *, progress: Progress | None = None) 
     measurement
         Of a linear or a planar array; echo or uplinks may be missing. A truth beside it is taken
         off first: the estimator is not given it.
+    images
+        Whether images and close-ups can be asked for later, when they are formed; the answer itself
+        does not need them.
     progress
         Told each stage.
 
@@ -97,7 +102,7 @@ def locate(measurement: model.Measurement, *, progress: Progress | None = None) 
     True
     """
     seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
-    return Estimate.of(localization.locate(seen, progress=progress), seen)
+    return Estimate.of(localization.locate(seen, images=images, progress=progress), seen)
 
 
 def simulate_to_file(

@@ -5,6 +5,7 @@ measures in space: only the stages that image, map and fit differ.
 """
 
 import time
+from dataclasses import replace
 
 from estimator.array.planar_array import spans_a_plane
 from estimator.localization.clock import clock_note, on_our_clock
@@ -16,22 +17,28 @@ from estimator.localization.stages_3d import PlanarStages
 from estimator.measurement.model import Measurement, frequency_step
 from estimator.positioning.decision_rules import decide
 from estimator.positioning.map_context import no_image
-from estimator.results.estimate import AngleRangeMap, DirectionMap, Estimate, Progress
+from estimator.results.deferred import Deferred
+from estimator.results.estimate import AngleRangeMap, DirectionMap, Estimate, Images, Progress
 
 
-def locate(measurement: Measurement, *, progress: Progress | None = None) -> Estimate:
+def locate(
+    measurement: Measurement, *, images: bool = True, progress: Progress | None = None
+) -> Estimate:
     """Find mirrors and users from a measurement alone.
 
     Parameters
     ----------
     measurement
         Echo and uplinks of a linear or a planar array; either may be missing.
+    images
+        Whether images and close-ups can be asked for later; then the answer holds the measurement
+        that they are formed of.
     progress
         Told each stage.
 
     Returns
     -------
-    Mirrors, users and the images, all in the world frame.
+    Mirrors, users and the images, all in the world frame; images are formed when asked for.
 
     Raises
     ------
@@ -63,7 +70,7 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         timings["mirrors"] = time.perf_counter() - started
     tell("estimate", 1, steps)
 
-    users, charts, close_ups = [], [], []
+    users, charts, looked = [], [], []
     for index, uplink in enumerate(uplinks):
         started = time.perf_counter()
         local = local_uplink(uplink, frame)
@@ -76,26 +83,33 @@ def locate(measurement: Measurement, *, progress: Progress | None = None) -> Est
         users.append(user_in_world(found, frame))
         charts.append(heard.chart)
         if isinstance(heard.chart, AngleRangeMap):
-            close_ups.append(close_up(local, heard.chart, found))
+            looked.append((local, heard.chart, found))
         timings[f"user {uplink.user}"] = time.perf_counter() - started
         tell("estimate", 2 + index, steps)
 
-    raw = corrected = None
-    if room is not None:
+    def formed() -> Images:
         started = time.perf_counter()
         ends = [frame.to_local(user.path) for user in users if user.path is not None]
-        raw, corrected = room.images(frame, ends)
+        made = Images() if room is None else room.images(frame, ends)
         timings["images"] = time.perf_counter() - started
+        return made
+
+    def closer() -> tuple[AngleRangeMap, ...]:
+        started = time.perf_counter()
+        made = tuple(close_up(*one) for one in looked)
+        timings["close-ups"] = time.perf_counter() - started
+        return made
+
     tell("estimate", steps, steps)
-    return Estimate(
+    estimate = Estimate(
         users=tuple(users),
         mirrors=() if room is None else room.mirrors(frame),
         targets=() if room is None else room.targets(frame),
-        raw_image=raw,
-        corrected_image=corrected,
         maps=tuple(chart for chart in charts if isinstance(chart, AngleRangeMap)),
-        close_ups=tuple(close_ups),
         direction_maps=tuple(chart for chart in charts if isinstance(chart, DirectionMap)),
         notes=tuple(notes),
         timings=timings,
     )
+    if not images:
+        return estimate
+    return replace(estimate, images=Deferred(formed), close_up_maps=Deferred(closer))

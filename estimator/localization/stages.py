@@ -16,9 +16,8 @@ from estimator.measurement.model import Echo, Measurement, Uplink
 from estimator.positioning.map_context import MapContext
 from estimator.results.estimate import (
     AngleRangeMap,
-    CorrectedImage,
     DirectionMap,
-    Image,
+    Images,
     Mirror,
     Target,
     UserEstimate,
@@ -61,9 +60,7 @@ class MappedRoom(Protocol):
         """Return the targets in the world's frame."""
         ...
 
-    def images(
-        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
-    ) -> tuple[Image, CorrectedImage]:
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
         """Form both images, around the map and some paths in the array's frame."""
         ...
 

@@ -24,8 +24,7 @@ from estimator.positioning.diffuse_fallback import with_diffuse_search
 from estimator.positioning.map_context import MapContext
 from estimator.results.estimate import (
     AngleRangeMap,
-    CorrectedImage,
-    Image,
+    Images,
     Mirror,
     Target,
     UserEstimate,
@@ -76,9 +75,7 @@ class LinearRoom:
         """Return the targets in the world's frame."""
         return targets_in_world(self.map, frame)
 
-    def images(
-        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
-    ) -> tuple[Image, CorrectedImage]:
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
         """Form both images, around the map and some paths in the array's frame."""
         return room_images(self.echo, self.map, frame, paths)
 

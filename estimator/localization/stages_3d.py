@@ -31,9 +31,8 @@ from estimator.mapping.map_images_3d import space_images
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.positioning.map_context import MapContext
 from estimator.results.estimate import (
-    CorrectedImage,
     DirectionMap,
-    Image,
+    Images,
     Mirror,
     Target,
     UserEstimate,
@@ -83,9 +82,7 @@ class PlanarRoom:
         """Return the targets in the world's frame."""
         return targets_in_world(self.map, frame)
 
-    def images(
-        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
-    ) -> tuple[Image, CorrectedImage]:
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
         """Read both images from the volume, around the map and some paths."""
         return space_images(self.map, frame, planar_resolution(self.array, self.echo), paths)
 

@@ -7,7 +7,7 @@ from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.specular_chains import Chain
 from estimator.imaging.focusing import Focus
 from estimator.mapping.ghost_correction import corrected_image
-from estimator.results.estimate import CorrectedImage, Image
+from estimator.results.estimate import CorrectedImage, Image, Images
 from estimator.results.pixel_grid import PixelGrid
 
 
@@ -19,7 +19,7 @@ def images_on(
     chains: Iterable[Chain],
     *,
     skin: float = 0.0,
-) -> tuple[Image, CorrectedImage]:
+) -> Images:
     """Form both images: the second has each pixel's brightest view, directly or over walls.
 
     Parameters
@@ -39,4 +39,4 @@ def images_on(
     corrected = CorrectedImage(
         values=unfolded.values, grid=grid, chains=unfolded.chains, chain=unfolded.chain
     )
-    return raw, corrected
+    return Images(raw=raw, corrected=corrected)

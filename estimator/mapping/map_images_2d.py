@@ -13,7 +13,7 @@ from estimator.imaging.range_compression import range_profiles
 from estimator.mapping.map_2d import RoomMap
 from estimator.mapping.map_images import images_on
 from estimator.measurement.model import Echo
-from estimator.results.estimate import CorrectedImage, Image
+from estimator.results.estimate import Images
 from estimator.results.pixel_grid import PixelGrid
 
 PIXELS = 2_000_000
@@ -27,7 +27,7 @@ def room_images(
     room: RoomMap,
     frame: ArrayFrame,
     paths: Sequence[Float[np.ndarray, "_ 3"]],
-) -> tuple[Image, CorrectedImage]:
+) -> Images:
     """Form the raw and the corrected image on one grid, around what was found."""
     focuser = prepare(range_profiles(echo))
     nearest, farthest = echo_reach(echo)

@@ -10,7 +10,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.geometry.specular_chains_3d import possible_chains
 from estimator.mapping.map_3d import SpaceMap
 from estimator.mapping.map_images import images_on
-from estimator.results.estimate import CorrectedImage, Image
+from estimator.results.estimate import Images
 from estimator.results.pixel_grid import PixelGrid
 
 VOXELS = 1_500_000
@@ -26,7 +26,7 @@ def space_images(
     frame: ArrayFrame,
     resolution: Resolution,
     paths: Sequence[Float[np.ndarray, "_ 3"]],
-) -> tuple[Image, CorrectedImage]:
+) -> Images:
     """Read the raw and the corrected image on one grid, around what was found."""
     looked = room.survey
     reach = float(looked.ranges[-1])

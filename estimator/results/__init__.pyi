@@ -1,9 +1,11 @@
+from .deferred import Deferred
 from .estimate import (
     AngleRangeMap,
     CorrectedImage,
     DirectionMap,
     Estimate,
     Image,
+    Images,
     Mirror,
     PathReport,
     Progress,
@@ -15,9 +17,11 @@ from .pixel_grid import PixelGrid
 __all__ = [
     "AngleRangeMap",
     "CorrectedImage",
+    "Deferred",
     "DirectionMap",
     "Estimate",
     "Image",
+    "Images",
     "Mirror",
     "PathReport",
     "PixelGrid",

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from estimator.results.deferred import Deferred
 from estimator.results.pixel_grid import PixelGrid
 
 Status = Literal["found", "not_found", "ambiguous"]
@@ -122,17 +123,50 @@ class UserEstimate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Images:
+    """The raw and the corrected image; without an echo there is neither."""
+
+    raw: Image | None = None
+    corrected: Image | None = None
+
+
+def no_close_ups() -> tuple[AngleRangeMap, ...]:
+    """Return none."""
+    return ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """The whole answer to one measurement."""
+    """The whole answer to one measurement.
+
+    Nothing in it rests on the images and the close-ups, which take as long as the answer: they are
+    formed when they are first asked for.
+    """
 
     users: tuple[UserEstimate, ...]
     mirrors: tuple[Mirror, ...]
     targets: tuple[Target, ...] = ()
-    raw_image: Image | None = None
-    corrected_image: Image | None = None
+    images: Deferred[Images] = field(default_factory=lambda: Deferred(Images))
     maps: tuple[AngleRangeMap, ...] = ()  # one for each user
-    close_ups: tuple[AngleRangeMap, ...] = ()  # the same, finely around each map's answer or peak
+    close_up_maps: Deferred[tuple[AngleRangeMap, ...]] = field(
+        default_factory=lambda: Deferred(no_close_ups)
+    )
     direction_maps: tuple[DirectionMap, ...] = ()  # one for each user of a planar array
     notes: tuple[str, ...] = ()  # what was assumed or could not be done
     timings: dict[str, float] = field(default_factory=dict)  # stage → duration [s]
     aperture: Float[np.ndarray, "positions 3"] | None = None  # that it was made from [m]
+
+    @property
+    def raw_image(self) -> Image | None:
+        """The image as measured, formed when first asked for; None without an echo."""
+        return self.images.value.raw
+
+    @property
+    def corrected_image(self) -> Image | None:
+        """The image with ghosts unfolded, formed with the raw one; None without an echo."""
+        return self.images.value.corrected
+
+    @property
+    def close_ups(self) -> tuple[AngleRangeMap, ...]:
+        """The maps once more, finely around each one's answer or peak; when first asked for."""
+        return self.close_up_maps.value

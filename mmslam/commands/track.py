@@ -103,7 +103,7 @@ def track(
     tell("samples", 0, len(times))
     found: list[dict[str, UserEstimate]] = []
     for measurement in series:
-        estimate = locate(measurement)
+        estimate = locate(measurement, images=False)
         found.append({user.name: user for user in estimate.users})
         tell("samples", len(found), len(times))
     users = track_answers(times, found, acceleration=acceleration)

@@ -9,6 +9,7 @@ import io
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from math import degrees, sqrt
 from typing import TYPE_CHECKING, Any, SupportsIndex, TypeVar, overload
 
@@ -211,10 +212,7 @@ class Estimate(_Shown, plain.Estimate):
     users: Users
     mirrors: tuple[Mirror, ...]
     targets: tuple[Target, ...] = ()
-    raw_image: Image | None = None
-    corrected_image: CorrectedImage | None = None
     maps: tuple[AngleRangeMap, ...] = ()
-    close_ups: tuple[AngleRangeMap, ...] = ()
     measurement: model.Measurement | None = None  # what it was made from
 
     @classmethod
@@ -225,13 +223,25 @@ class Estimate(_Shown, plain.Estimate):
             "users": Users(_user(user) for user in estimate.users),
             "mirrors": tuple(_as(Mirror, one) for one in estimate.mirrors),
             "targets": tuple(_as(Target, one) for one in estimate.targets),
-            "raw_image": _as(Image, estimate.raw_image),
-            "corrected_image": _as(CorrectedImage, estimate.corrected_image),
             "maps": tuple(_as(AngleRangeMap, one) for one in estimate.maps),
-            "close_ups": tuple(_as(AngleRangeMap, one) for one in estimate.close_ups),
             "aperture": (measurement.echo or measurement.uplinks[0]).positions,
         }
         return cls(**parts, measurement=measurement)
+
+    @cached_property
+    def raw_image(self) -> Image | None:
+        """The image as measured, formed when first asked for; None without an echo."""
+        return _as(Image, self.images.value.raw)
+
+    @cached_property
+    def corrected_image(self) -> CorrectedImage | None:
+        """The image with ghosts unfolded, formed with the raw one; None without an echo."""
+        return _as(CorrectedImage, self.images.value.corrected)
+
+    @cached_property
+    def close_ups(self) -> tuple[AngleRangeMap, ...]:
+        """The maps once more, finely around each one's answer or peak; when first asked for."""
+        return tuple(_as(AngleRangeMap, one) for one in self.close_up_maps.value)
 
     def plot(self, *, truth: Truth | None = None, ax: "Axes | None" = None) -> "Axes":
         """Draw the plan of what was found: array, mirrors, targets, paths and users.

@@ -14,8 +14,10 @@ _CLOSE_UPS = 3
 
 def in_space(estimate: Estimate) -> bool:
     """Tell whether an estimate is one of a planar array."""
+    if estimate.maps or estimate.direction_maps:
+        return bool(estimate.direction_maps)
     image = estimate.raw_image
-    return bool(estimate.direction_maps) or (image is not None and image.values.ndim == 3)
+    return image is not None and image.values.ndim == 3
 
 
 def volume_figure(

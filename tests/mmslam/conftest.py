@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from estimator.measurement.model import Echo, Measurement, Uplink
-from estimator.results.estimate import AngleRangeMap, Estimate, Image, Mirror, Target, UserEstimate
+from estimator.results.deferred import Deferred
+from estimator.results.estimate import (
+    AngleRangeMap,
+    Estimate,
+    Image,
+    Images,
+    Mirror,
+    Target,
+    UserEstimate,
+)
 from estimator.results.pixel_grid import PixelGrid
 from validation.metrics.truth import Truth
 
@@ -73,10 +82,9 @@ def estimate() -> Estimate:
                 seen_through=(0,),
             ),
         ),
-        raw_image=image,
-        corrected_image=image,
+        images=Deferred.of(Images(raw=image, corrected=image)),
         maps=(heard,),
-        close_ups=(heard,),
+        close_up_maps=Deferred.of((heard,)),
         notes=("z = 0 and y > 0 are assumed",),
         timings={"image": 0.25},
     )
@@ -85,4 +93,5 @@ def estimate() -> Estimate:
 @pytest.fixture
 def nothing_found(estimate: Estimate) -> Estimate:
     lost = UserEstimate(name="ann", status="not_found", reason="no peak above the noise")
-    return replace(estimate, users=(lost,), mirrors=(), targets=(), corrected_image=None)
+    images = Deferred.of(Images(raw=estimate.raw_image))
+    return replace(estimate, users=(lost,), mirrors=(), targets=(), images=images)

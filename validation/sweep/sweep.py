@@ -221,7 +221,8 @@ def run_point(job: SweepJob, point: int) -> None:
     quiet = noise_free(scenario, seed=seed, sample=sample, folder=job.cache / "noise_free")
     from estimator.localization.pipeline import locate
 
-    estimate = locate(with_receiver(quiet, scenario, seed=seed, sample=sample))
+    noisy = with_receiver(quiet, scenario, seed=seed, sample=sample)
+    estimate = locate(noisy, images=False)
     truth = truth_from_dataset(scenario_truth(scenario))
     found = [_compared(scenario, user, estimate, truth) for user in estimate.users]
     path.parent.mkdir(parents=True, exist_ok=True)

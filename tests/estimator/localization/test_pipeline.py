@@ -15,7 +15,9 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from estimator.geometry.wall_2d import mirrored
+from estimator.localization import pipeline
 from estimator.localization.pipeline import locate
+from estimator.mapping import map_images_2d
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.results.estimate import Estimate, UserEstimate
 from scenes.scenario import parse_scenario
@@ -176,6 +178,34 @@ def test_the_images_show_the_wall_and_nothing_behind_it(
     assert shadow.any()
     assert not corrected.values[shadow].any()
     assert raw.values[shadow].any()
+
+
+def test_images_are_formed_once_and_only_when_somebody_looks(
+    hidden: tuple[Measurement, Estimate], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    formed: list[str] = []
+    for name in ("images_on", "close_up"):
+        module = {"images_on": map_images_2d, "close_up": pipeline}[name]
+        make = getattr(module, name)
+
+        def noted(*parts: Any, name: str = name, make: Any = make, **more: Any) -> Any:
+            formed.append(name)
+            return make(*parts, **more)
+
+        monkeypatch.setattr(module, name, noted)
+    blind = locate(hidden[0], images=False)
+    assert (blind.raw_image, blind.corrected_image, blind.close_ups) == (None, None, ())
+    seen = locate(hidden[0])
+    assert formed == []
+    assert seen.timings.keys() == blind.timings.keys()
+    for _ in range(2):
+        assert seen.raw_image is not None
+        assert seen.corrected_image is not None
+        assert len(seen.close_ups) == 1
+    assert formed == ["images_on", "close_up"]
+    assert {"images", "close-ups"} < seen.timings.keys()
+    for one, other in ((seen, hidden[1]), (blind, hidden[1])):
+        np.testing.assert_array_equal(only(one).position, only(other).position)
 
 
 def test_the_progress_ends_where_it_says(room: Room) -> None:

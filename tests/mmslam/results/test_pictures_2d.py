@@ -5,7 +5,8 @@ import numpy as np
 from matplotlib.image import imread
 
 from estimator.measurement.model import Measurement
-from estimator.results.estimate import Estimate
+from estimator.results.deferred import Deferred
+from estimator.results.estimate import Estimate, Images, no_close_ups
 from mmslam import own_results
 from mmslam.results.pictures_2d import write_pictures
 from validation.metrics.truth import Truth
@@ -35,6 +36,8 @@ def test_the_same_result_gives_the_same_bytes(
 def test_what_was_not_measured_has_no_figure(
     tmp_path: Path, measurement: Measurement, nothing_found: Estimate
 ) -> None:
-    deaf = replace(nothing_found, raw_image=None, maps=(), close_ups=())
+    deaf = replace(
+        nothing_found, images=Deferred(Images), maps=(), close_up_maps=Deferred(no_close_ups)
+    )
     pictures = write_pictures(tmp_path, replace(measurement, echo=None), deaf, Truth())
     assert sorted(pictures) == ["localization.png"]

@@ -6,7 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from estimator.measurement.model import Measurement
-from estimator.results.estimate import DirectionMap, Estimate, Image
+from estimator.results.deferred import Deferred
+from estimator.results.estimate import DirectionMap, Estimate, Image, Images, no_close_ups
 from estimator.results.pixel_grid import PixelGrid
 from mmslam.results.document import result_document
 from mmslam.results.pictures_2d import write_pictures
@@ -38,10 +39,9 @@ def in_space(estimate: Estimate, volume: Image) -> Estimate:
         estimate,
         mirrors=(mirror,),
         users=(replace(estimate.users[0], elevation=0.05),),
-        raw_image=volume,
-        corrected_image=volume,
+        images=Deferred.of(Images(raw=volume, corrected=volume)),
         maps=(),
-        close_ups=(),
+        close_up_maps=Deferred(no_close_ups),
         direction_maps=(heard,),
     )
 
