@@ -120,6 +120,8 @@ class UserEstimate:
     method: Method = "paths"  # what the position rests on
     clock_offset: float | None = None  # as solved for; None: known, or it cannot be told [s]
     clock_deviation: float | None = None  # its standard deviation [s]
+    probability: float | None = None
+    """That the user is here, given map, paths and priors; None where none was worked out. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ from validation.claims import (
     imaging,
     limits,
     propagation,
+    random_rooms,
     scenarios,
     thesis,
 )
@@ -19,5 +20,6 @@ ALL_CLAIMS: tuple[Claim, ...] = (
     *thesis.CLAIMS,
     *scenarios.CLAIMS,
     *limits.CLAIMS,
+    *random_rooms.CLAIMS,
 )
 """In the order in which they are told: physics first, then what is built on it."""

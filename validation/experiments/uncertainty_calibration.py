@@ -22,12 +22,12 @@ from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from estimator.localization.pipeline import locate
-from estimator.results.estimate import Mirror
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.harness.claim import Tell
 from validation.metrics.coverage import consistency, coverage, normalised_square
-from validation.metrics.truth import Truth, truth_from_dataset
+from validation.metrics.mirror_check import wall_square
+from validation.metrics.truth import truth_from_dataset
 
 TRIALS = 200
 HALF_SIZE = (
@@ -90,19 +90,6 @@ def calibration(
         squares=np.array(squares),
         wall_squares=np.array(wall_squares),
     )
-
-
-def wall_square(mirror: Mirror, truth: Truth, name: str) -> float:
-    """Return the square of a wall's errors of angle and offset, over their covariance. [-]."""
-    along = (mirror.end - mirror.start)[:2]
-    along = along / np.linalg.norm(along)
-    true = (truth.wall_end[name] - truth.wall_start[name])[:2]
-    true = true * np.sign(along @ true) / np.linalg.norm(true)
-    tilt = float(np.arcsin(true[0] * along[1] - true[1] * along[0]))
-    middle = 0.5 * (mirror.start + mirror.end)
-    away = (middle - truth.wall_start[name])[:2]
-    error = np.array([tilt, away[0] * true[1] - away[1] * true[0]])
-    return normalised_square(error, mirror.covariance)
 
 
 def draw(ax: Axes, name: str, result: Calibration) -> Axes:

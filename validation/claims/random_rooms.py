@@ -1,0 +1,90 @@
+"""Rooms that nobody drew: how often the answer is right, wrong or left open."""
+
+from matplotlib.figure import Figure
+
+from validation.harness.claim import Claim, Effort, Finding, Row, Tell
+from validation.random_rooms.judging import judge_rooms
+from validation.random_rooms.room_pictures import draw_rooms
+from validation.random_rooms.room_summary import summarise, table_rows
+
+QUICK, FULL = 40, 200
+PICTURES = 4
+
+WRONG = 0.10
+"""Share of rooms with a confidently wrong place that is not exceeded today. [-]"""
+FALSE_MIRRORS = 0.08
+"""The same of false mirrors, for each room. [-]"""
+ANSWERED = 0.20
+"""Share of the rooms that the oracle answers in which the user is found and right, today. [-]"""
+WALLS = 0.25
+"""Share of the walls that the echo shows which are found, today. [-]"""
+
+
+def random_rooms(effort: Effort, tell: Tell) -> Finding:
+    """Answer rooms drawn at random, which were never tuned on."""
+    count = FULL if effort == "full" else QUICK
+    scores = judge_rooms("plain", range(count), purpose="judging", tell=tell)
+    found = summarise(scores)
+    today = "what is reached today, with the scatter of so many rooms; the aim stands beside it"
+    rows = [
+        Row(
+            name=f"confidently wrong places in {count} rooms",
+            stated="the aim: 2 in 1000",
+            measured=float(found.verdicts["wrong"]),
+            high=_most(WRONG, count),
+            origin=today,
+        ),
+        Row(
+            name=f"false mirrors at confidence above 0.99 in {count} rooms",
+            stated="the aim: 2 in 1000 rooms",
+            measured=float(found.false_mirrors),
+            high=_most(FALSE_MIRRORS, count),
+            origin=today,
+        ),
+        Row(
+            name=f"found and right, of the {found.answerable} rooms that an oracle answers",
+            stated="the aim: 75 %",
+            measured=100 * found.answered / max(found.answerable, 1),
+            unit="%",
+            low=100 * _least(ANSWERED, found.answerable),
+            origin=today,
+        ),
+        Row(
+            name=f"walls found, of {found.walls_shown} that the echo shows",
+            stated="the aim: 90 %",
+            measured=100 * found.walls_found / max(found.walls_shown, 1),
+            unit="%",
+            low=100 * _least(WALLS, found.walls_shown),
+            origin=today,
+        ),
+    ]
+
+    def draw(figure: Figure) -> None:
+        bad = [one for one in scores if one.verdict == "wrong" or one.false_mirrors]
+        worst = sorted(bad, key=lambda one: -(one.error or 0.0))[:PICTURES]
+        numbers = [int(one.room.rsplit("_", 1)[-1]) for one in worst]
+        draw_rooms(figure, "plain", numbers, purpose="judging")
+
+    remarks = [f"{what}: {value}" for what, value in table_rows(found)]
+    return Finding(rows=rows, draw=draw, remarks=remarks)
+
+
+def _most(share: float, count: int) -> float:
+    """Return three deviations more than a share of so many. [-]."""
+    return float(count * share + 3 * (count * share * (1 - share)) ** 0.5)
+
+
+def _least(share: float, count: int) -> float:
+    """Return three deviations less than a share, of so many. [-]."""
+    return max(0.0, share - 3 * (share * (1 - share) / max(count, 1)) ** 0.5)
+
+
+CLAIMS = (
+    Claim(
+        key="random_rooms",
+        title="Rooms that nobody drew: right, wrong, left open",
+        source="the design: no knowledge of the environment",
+        measure=random_rooms,
+        minutes=40.0,
+    ),
+)
