@@ -1,5 +1,7 @@
 """Rooms that nobody drew: how often the answer is right, wrong or left open."""
 
+import math
+
 from matplotlib.figure import Figure
 
 from validation.harness.claim import Claim, Effort, Finding, Row, Tell
@@ -71,12 +73,12 @@ def random_rooms(effort: Effort, tell: Tell) -> Finding:
 
 def _most(share: float, count: int) -> float:
     """Return three deviations more than a share of so many. [-]."""
-    return float(count * share + 3 * (count * share * (1 - share)) ** 0.5)
+    return count * share + 3 * math.sqrt(count * share * (1 - share))
 
 
 def _least(share: float, count: int) -> float:
     """Return three deviations less than a share, of so many. [-]."""
-    return max(0.0, share - 3 * (share * (1 - share) / max(count, 1)) ** 0.5)
+    return max(0.0, share - 3 * math.sqrt(share * (1 - share) / max(count, 1)))
 
 
 CLAIMS = (
