@@ -5,11 +5,13 @@ from .calibration import (
     subtract_background,
     without_frequencies,
 )
+from .frequency_resampling import EqualSteps, to_equal_steps
 from .model import Echo, Measurement, MeasurementError, Uplink, Waves, frequency_step
 from .store import is_store, measurement_to_dataset, read_measurement, write_measurement
 
 __all__ = [
     "Echo",
+    "EqualSteps",
     "Measurement",
     "MeasurementError",
     "Uplink",
@@ -22,6 +24,7 @@ __all__ = [
     "read_measurement",
     "remove_path",
     "subtract_background",
+    "to_equal_steps",
     "without_frequencies",
     "write_measurement",
 ]

@@ -1,0 +1,16 @@
+from .frequency_table import FrequencyTable
+from .position_table import PositionTable
+from .signal_tables import EchoTable, RawTable, ResponseTable, SamplesTable, SignalTable
+from .time_tables import ChirpTable, TimeTable
+
+__all__ = [
+    "ChirpTable",
+    "EchoTable",
+    "FrequencyTable",
+    "PositionTable",
+    "RawTable",
+    "ResponseTable",
+    "SamplesTable",
+    "SignalTable",
+    "TimeTable",
+]
