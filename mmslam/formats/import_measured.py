@@ -81,7 +81,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 transmit_positions=transmitters,
             )
         echo = _calibrated(reader, raw, mapping.echo, "echo")
-        notes += _notes(source, "echo", echo, found)
+        notes += _notes(source, "echo", echo, found, stepped=mapping.frequency is not None)
     uplinks = []
     for user, table in mapping.uplinks.items():
         name = f"uplinks.{user}"
@@ -94,7 +94,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 user=user,
             )
         uplinks.append(_calibrated(reader, pilot, table, name))
-        notes += _notes(source, name, uplinks[-1], found)
+        notes += _notes(source, name, uplinks[-1], found, stepped=mapping.frequency is not None)
     array = echo.positions if echo is not None else uplinks[0].positions
     given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
     boresight, remark = boresight_of(str(source), array, given)
@@ -156,9 +156,12 @@ def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str)
     return remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
 
 
-def _notes(source: Path, name: str, data: Echo | Uplink, found: Signal) -> list[str]:
+def _notes(
+    source: Path, name: str, data: Echo | Uplink, found: Signal, *, stepped: bool
+) -> list[str]:
     notes = [
-        strength_note(f"{source}: {name}", data.samples),
+        # The spectrum of a trace has the unit of its samples, times their number.
+        strength_note(f"{source}: {name}", data.samples) if stepped else None,
         sign_note(f"{source}: {name}", data.samples, data.frequencies),
     ]
     return [*found.notes, *(note for note in notes if note is not None)]

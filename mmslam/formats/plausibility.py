@@ -1,7 +1,7 @@
 """Checks that a measurement's magnitudes are physically possible: wrong units are refused."""
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Num
 from scipy.constants import speed_of_light
 from scipy.spatial import cKDTree
 
@@ -31,7 +31,7 @@ FARTHEST = 1000.0
 """Largest coordinate; beyond, phases at 1 THz lose 1e-6 rad in double precision. [m]"""
 
 
-def check_samples(name: str, samples: Complex[np.ndarray, "positions freqs"]) -> None:
+def check_samples(name: str, samples: Num[np.ndarray, "positions points"]) -> None:
     """Refuse samples that no receiver gives.
 
     Raises
