@@ -36,9 +36,9 @@ class UnfoldedWalls:
     seen_through: tuple[Chain, ...]
     covariance: Float[np.ndarray, "parameters parameters"]
     """Of all walls' (angle [rad], offset [m]), one wall after the other."""
-    views: tuple[tuple[FittedLine, Wall], ...]
-    """Every line that is seen over mirrors, with its true place: also those that are left out,
-    as another view of a wall."""
+    views: tuple[tuple[FittedLine, Wall, FittedLine], ...]
+    """Every line that is seen over mirrors, with its true place and the mirror that is nearest to
+    the array: also those that are left out, as another view of a wall."""
 
 
 def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> UnfoldedWalls:
@@ -58,12 +58,12 @@ def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> Unfolde
     kept: list[FittedLine] = []
     walls: list[Wall] = []
     seen: list[Chain] = []
-    views: list[tuple[FittedLine, Wall]] = []
+    views: list[tuple[FittedLine, Wall, FittedLine]] = []
     for line in _from_the_array_outward(lines):
         chain = _chain_before(line, walls)
         unfolding = _unfolded(line, walls, chain)
         if chain:
-            views.append((line, unfolding))
+            views.append((line, unfolding, kept[chain[0]]))
         same = any(_is_one(line, unfolding, wall, resolution) for wall in walls)
         if len(chain) == LONGEST_CHAIN or same:
             continue
@@ -105,8 +105,9 @@ def unfold_seen_lines(lines: Sequence[FittedLine], resolution: Resolution) -> Un
 def _is_mixed(line: FittedLine, unfolding: UnfoldedWalls, resolution: Resolution) -> bool:
     """Tell whether most of a line is halfway between another's place and its wall's."""
     points = np.linspace(line.start, line.end, SAMPLES)
-    for other, wall in unfolding.views:
-        if other is line:
+    for other, wall, door in unfolding.views:
+        # A mirror is halfway between what is seen over it and its wall, whatever that is.
+        if line is other or line is door:
             continue
         places = [np.linspace(one.start, one.end, MIXED_SAMPLES) for one in (other, wall)]
         mixed = [

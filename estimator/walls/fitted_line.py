@@ -18,6 +18,7 @@ class FittedLine:
     level: float  # mean intensity along it [-]
     background: float  # mean intensity beside it [-]
     confidence: float  # one minus the probability that background alone does this
+    explained: float = 1.0  # share of its echo that a row of scatterers explains, if examined [-]
 
     @property
     def middle(self) -> Float[np.ndarray, " 3"]:

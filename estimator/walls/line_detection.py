@@ -78,7 +78,7 @@ def find_lines(
         found.append(candidate)
         # The line's own peaks go, and the skirt of sidelobes beside it.
         unassigned = unassigned[
-            ~(members | _on_segment(unassigned, candidate, resolution, tolerance=SKIRT))
+            ~(members | on_segment(unassigned, candidate, resolution, tolerance=SKIRT))
         ]
     return tuple(found)
 
@@ -146,13 +146,26 @@ def _longest_run(
     return LineCandidate(start=ends[0], end=ends[1], inliers=len(run)), used
 
 
-def _on_segment(
+def on_segment(
     peaks: Float[np.ndarray, "peaks 3"],
     line: LineCandidate,
     resolution: Resolution,
     *,
     tolerance: float,
 ) -> Bool[np.ndarray, " peaks"]:
+    """Tell which peaks lie on a segment, or up to :data:`BEYOND_END` beyond its ends.
+
+    Parameters
+    ----------
+    peaks
+        In the array's frame. [m]
+    line
+        The segment.
+    resolution
+        Of the image.
+    tolerance
+        Distance across the line that still counts. [cells]
+    """
     along = line.end - line.start
     length = float(np.linalg.norm(along))
     direction = along / length

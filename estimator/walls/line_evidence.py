@@ -1,0 +1,107 @@
+r"""Is a line of the image a wall? What a row of scatterers on it explains, and what it cannot.
+
+Two questions, each to the echo itself:
+
+*Explained share*. The row's strengths are fitted to all range profiles by least squares, as in
+:mod:`estimator.walls.line_fit_echo`. Echo and residual are then focused on cells along the line and
+beside it. A wall leaves little there. A wave that was scattered twice, a line through unconnected
+peaks, or an arc of sidelobes, is focused by no row: most of it stays beside the line. Echo from the
+same ranges but other directions does not count.
+
+*More than one range*. The sidelobes of a point that only a part of the array sees lie on an arc of
+its range. A short line along an arc is told from it only by the reflection of the array.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import cho_solve
+
+from estimator.array.resolution_cell import Resolution
+from estimator.measurement.model import Echo
+from estimator.walls.fitted_line import FittedLine
+from estimator.walls.line_sampling import trial_points
+from estimator.walls.scatterer_row import (
+    adjoint,
+    factorized,
+    row_echoes,
+    row_places,
+    row_profiles,
+)
+
+MOST_CELLS = 40.0
+"""Longest part of a line that is explained: its cost grows as the fourth power. [cells]"""
+MOST_POSITIONS = 128
+"""Most antenna positions of which it is explained. [-]"""
+ASIDE = np.arange(-4.0, 5.0)
+"""Places across the line at which echo and residual are compared. [cells]"""
+BEYOND = 4.0
+"""How far the row goes on beyond the line's ends, which are found to a few cells. [cells]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What the echo says of a line."""
+
+    explained: float  # share of a cell's echo, on the line and beside it, by the row: median [-]
+    depth: float  # extent in range [cells]
+
+
+def examine(echo: Echo, line: FittedLine, resolution: Resolution) -> Evidence:
+    """Examine a line of the image.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame, of uniform frequencies.
+    line
+        As fitted to the image.
+    resolution
+        Of the echo.
+    """
+    ranges = np.linalg.norm([line.start, line.end, _nearest_place(line)], axis=-1)
+    return Evidence(
+        explained=_explained(echo, line, resolution),
+        depth=float(np.ptp(ranges)) / resolution.along_ray,
+    )
+
+
+def _nearest_place(line: FittedLine) -> Float[np.ndarray, " 3"]:
+    """Return the place of a line that is nearest to the array's centre. [m]."""
+    along = -float(line.middle @ line.direction)
+    half = 0.5 * line.length
+    place: np.ndarray = line.middle + float(np.clip(along, -half, half)) * line.direction
+    return place
+
+
+def _explained(echo: Echo, line: FittedLine, resolution: Resolution) -> float:
+    """Return the share of the echo on a line and beside it that a row on the line explains. [-]."""
+    cell = float(resolution.cell(line.middle, line.direction))
+    half = 0.5 * min(line.length, MOST_CELLS * cell) * line.direction
+    start, end = line.middle - half, line.middle + half
+    every = max(1, int(np.ceil(len(echo.positions) / MOST_POSITIONS)))
+    few = Echo(
+        samples=echo.samples[::every],
+        positions=echo.positions[::every],
+        frequencies=echo.frequencies,
+        transmit_positions=None
+        if echo.transmit_positions is None
+        else echo.transmit_positions[::every],
+    )
+    places = row_places(few, start, end, (BEYOND * cell, BEYOND * cell))
+    row = line.middle + places[:, None] * line.direction
+    profiles = row_profiles(few, start, end)
+    data = profiles.values.ravel()
+    echoes = row_echoes(few, profiles, row, line.normal)[0]
+    left = data - echoes @ cho_solve(factorized(echoes), adjoint(echoes, data))
+    count = max(1, round(2 * float(np.linalg.norm(half)) / cell))
+    along = ((np.arange(count) + 0.5) / count - 0.5) * 2 * float(np.linalg.norm(half))
+    across = ASIDE * float(resolution.cell(line.middle, line.normal))
+    cells = trial_points(start, end, along, np.zeros(1), across)[0].reshape(-1, 3)
+    focused = row_echoes(few, profiles, cells, line.normal)[0]
+    seen, unexplained = (
+        (np.abs(adjoint(focused, values)) ** 2).reshape(across.size, -1).sum(axis=0)
+        for values in (data, left)
+    )
+    return float(np.median(1 - unexplained / seen))
