@@ -7,6 +7,7 @@ from .calibration import (
 )
 from .frequency_resampling import EqualSteps, to_equal_steps
 from .model import Echo, Measurement, MeasurementError, Uplink, Waves, frequency_step
+from .shared_signal import SharedSignal, shared_signal, without_delays, without_shared_signal
 from .store import is_store, measurement_to_dataset, read_measurement, write_measurement
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "EqualSteps",
     "Measurement",
     "MeasurementError",
+    "SharedSignal",
     "Uplink",
     "Waves",
     "equalise",
@@ -23,8 +25,11 @@ __all__ = [
     "measurement_to_dataset",
     "read_measurement",
     "remove_path",
+    "shared_signal",
     "subtract_background",
     "to_equal_steps",
+    "without_delays",
     "without_frequencies",
+    "without_shared_signal",
     "write_measurement",
 ]

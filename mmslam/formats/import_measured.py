@@ -14,6 +14,12 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement.calibration import equalise, remove_path, subtract_background
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.shared_signal import (
+    PROPOSED_DB,
+    shared_signal,
+    without_delays,
+    without_shared_signal,
+)
 from mmslam.formats.array_reader import FILES, ArrayReader
 from mmslam.formats.boresight import boresight_of
 from mmslam.formats.mapping import SweepMapping
@@ -69,6 +75,12 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
         else ArrayReader(source, mapping, base)
     )
     notes: list[str] = []
+    stepped = mapping.time is None and mapping.chirp is None
+    if mapping.refractive_index != 1.0:
+        notes.append(
+            f"{source}: in a medium of refractive index {mapping.refractive_index:g}: frequencies "
+            "are stored times it, lengths are the medium's"
+        )
     echo = None
     if mapping.echo is not None:
         found = reader.signal("echo", mapping.echo)
@@ -81,7 +93,8 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 transmit_positions=transmitters,
             )
         echo = _calibrated(reader, raw, mapping.echo, "echo")
-        notes += _notes(source, "echo", echo, found, stepped=mapping.frequency is not None)
+        notes += _notes(source, "echo", echo, found, stepped=stepped)
+        echo = _in_medium(echo, mapping.refractive_index)
     uplinks = []
     for user, table in mapping.uplinks.items():
         name = f"uplinks.{user}"
@@ -93,8 +106,9 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 frequencies=found.frequencies,
                 user=user,
             )
-        uplinks.append(_calibrated(reader, pilot, table, name))
-        notes += _notes(source, name, uplinks[-1], found, stepped=mapping.frequency is not None)
+        pilot = _calibrated(reader, pilot, table, name)
+        notes += _notes(source, name, pilot, found, stepped=stepped)
+        uplinks.append(_in_medium(pilot, mapping.refractive_index))
     array = echo.positions if echo is not None else uplinks[0].positions
     given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
     boresight, remark = boresight_of(str(source), array, given)
@@ -139,6 +153,9 @@ def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str)
         if len(samples) == 1 and not same:  # one sweep serves all positions
             samples = np.broadcast_to(samples, (len(data.positions), samples.shape[1]))
             positions = data.positions
+        elif len(positions) > len(data.positions):  # some of ours were left out
+            kept = np.array([(row == data.positions).all(axis=1).any() for row in positions])
+            samples, positions = samples[kept], positions[kept]
         with told(f"{name}.background"):
             background = replace(
                 data, samples=samples, positions=positions, frequencies=empty.frequencies
@@ -153,7 +170,21 @@ def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str)
                 )
             data = equalise(data, through.samples[0], phase_only=table.response.phase_only)
     # The delay in air has the same phase: l = τ·c.
-    return remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
+    data = remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
+    if table.subtract_shared is not None:
+        shared = table.subtract_shared
+        with told(f"{name}.subtract_shared"):
+            data = without_shared_signal(data, components=None if shared == "mean" else shared)
+    if table.gate_out_ns is not None:
+        with told(f"{name}.gate_out_ns"):
+            first, last = (1e-9 * one for one in table.gate_out_ns)
+            data = without_delays(data, first, last)
+    return data
+
+
+def _in_medium(data: Data, index: float) -> Data:
+    """Store the frequencies times the refractive index: wavelengths and delays are the medium's."""
+    return data if index == 1.0 else replace(data, frequencies=data.frequencies * index)
 
 
 def _notes(
@@ -162,6 +193,22 @@ def _notes(
     notes = [
         # The spectrum of a trace has the unit of its samples, times their number.
         strength_note(f"{source}: {name}", data.samples) if stepped else None,
-        sign_note(f"{source}: {name}", data.samples, data.frequencies),
     ]
+    if stepped:
+        notes.append(sign_note(f"{source}: {name}", data.samples, data.frequencies))
+    if isinstance(data, Echo):
+        notes.append(_shared_note(f"{source}: {name}", data))
     return [*found.notes, *(note for note in notes if note is not None)]
+
+
+def _shared_note(name: str, data: Echo) -> str | None:
+    """Propose to subtract what all positions share, where it covers everything else."""
+    shared = shared_signal(data)
+    if shared is None or shared.above_rest_db < PROPOSED_DB:
+        return None
+    return (
+        f"{name}: all positions share one constant, {shared.above_rest_db:.0f} dB above the rest, "
+        f"with the delay of a path of {shared.path:.3g} m there and back: an antenna's mismatch, a "
+        'leak or an offset, or a plate that faces all of them; set subtract_shared = "mean" to '
+        "see what is behind it"
+    )

@@ -36,6 +36,11 @@ class SweepMapping(Checked):
         description="the unit vector to which the array looks; left out, an area of positions in "
         "x and y looks along z, and any other array along y",
     )
+    refractive_index: Annotated[float, Field(ge=1, le=20)] = Field(
+        default=1.0,
+        description="of the medium that all waves run in (dry sand 1.6, water 9): frequencies are "
+        "stored times it, so that lengths come out right",
+    )
     clock_offset_ns: float | None = Field(
         default=None, description="the user's clock minus ours; leave it out if it is unknown"
     )

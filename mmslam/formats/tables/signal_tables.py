@@ -131,6 +131,16 @@ class SignalTable(SamplesTable):
     response: ResponseTable | None = Field(
         default=None, description="the radio's response; it is divided out"
     )
+    subtract_shared: Literal["mean"] | Annotated[int, Field(ge=1)] | None = Field(
+        default=None,
+        description='what all positions share is subtracted: "mean", or a number of the strongest '
+        "principal components",
+    )
+    gate_out_ns: Annotated[list[float], Field(min_length=2, max_length=2)] | None = Field(
+        default=None,
+        description="delays, there and back, that are taken out (an antenna's own mismatch), "
+        "counted after cable_delay_ns",
+    )
     cable_delay_ns: float = Field(
         default=0.0, description="the delay of all cables in the signal's way, there and back"
     )

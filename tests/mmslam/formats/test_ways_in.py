@@ -385,3 +385,35 @@ def test_a_scan_over_x_and_y_looks_along_z_and_a_circle_keeps_its_boresight(
             take(tmp_path, "s.npz", "boresight = [0.0, 1.0, 0.0]\n" + mapping)
         other = take(tmp_path, "s.npz", "boresight = [0.0, 0.0, -1.0]\n" + mapping)
         np.testing.assert_allclose(other.measurement.boresight, [0.0, 0.0, -1.0])
+
+
+def test_a_constant_that_covers_the_scene_is_proposed_to_be_subtracted_and_is(
+    tmp_path: Path,
+) -> None:
+    leak = np.exp(-2j * np.pi * FREQUENCIES * 0.3e-9) * (0.7 + 0.3 * np.cos(FREQUENCIES / 3e8))
+    np.savez(tmp_path / "s.npz", s=0.01 * echo_of(plane()) + 0.1 * leak, p=plane())
+    mapping = FREQUENCY + 'positions = { variable = "p", unit = "m" }\n[echo]\nvariable = "s"\n'
+    (note,) = take(tmp_path, "s.npz", mapping).notes
+    assert "all positions share one constant" in note
+    assert 'subtract_shared = "mean"' in note
+    cleaned = take(tmp_path, "s.npz", mapping + 'subtract_shared = "mean"\n')
+    assert not cleaned.notes
+    exact = 0.01 * echo_of(plane())
+    assert cleaned.measurement.echo is not None
+    np.testing.assert_allclose(
+        cleaned.measurement.echo.samples, exact - exact.mean(axis=0), atol=1e-15
+    )
+    echo = taken(tmp_path, "s.npz", mapping + "gate_out_ns = [-0.5, 0.9]\n")
+    assert np.abs(echo.samples).max() < 0.01 * np.abs(leak).max()
+    with pytest.raises(MeasurementError, match=r"echo\.gate_out_ns: a gate of .* must rise"):
+        take(tmp_path, "s.npz", mapping + "gate_out_ns = [0.9, 0.5]\n")
+
+
+def test_in_a_medium_lengths_come_out_by_its_refractive_index(tmp_path: Path) -> None:
+    slow = echo_of(line(), 1.5 * FREQUENCIES)  # every path is 1.5 times as long
+    np.savez(tmp_path / "s.npz", s=slow)
+    mapping = "refractive_index = 1.5\n" + FREQUENCY + LINE + 'echo = { variable = "s" }'
+    imported = take(tmp_path, "s.npz", mapping)
+    assert imported.measurement.echo is not None
+    assert_is_the_point(imported.measurement.echo)
+    assert any("refractive index 1.5" in note for note in imported.notes)
