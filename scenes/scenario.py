@@ -22,6 +22,7 @@ from scenes.meshes.mesh_file import placed_mesh
 from scenes.schema.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
 from scenes.schema.base_station import BaseStation
 from scenes.schema.directions import unit_vector
+from scenes.schema.effects import Effects
 from scenes.schema.errors import ScenarioError, did_you_mean, problems
 from scenes.schema.impairments import Impairments
 from scenes.schema.materials import MATERIALS, Slab
@@ -44,6 +45,7 @@ __all__ = [
     "Cosine",
     "Cylinder",
     "Directive",
+    "Effects",
     "GaussianBeam",
     "Horn",
     "Impairments",
@@ -102,6 +104,7 @@ class Scenario(Checked):
         default_factory=dict, description="ideal point targets by name"
     )
     users: dict[Name, User] = Field(default_factory=dict, description="users by name")
+    effects: Effects = Field(default_factory=Effects, description="the table [effects]")
     noise: Noise = Field(default_factory=Noise, description="the table [noise]")
     impairments: Impairments = Field(
         default_factory=Impairments, description="the table [impairments]"

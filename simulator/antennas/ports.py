@@ -1,7 +1,7 @@
 """Antenna ports: where they stand and how their fields depend on direction."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
@@ -25,6 +25,23 @@ class Ports:
     visible: Bool[np.ndarray, "ports facets"]
     nodes: int = 1  # frequencies that the pattern has to be sampled at
     polarization: Polarization = VERTICAL  # in two dimensions the field is along z
+    behind_slabs: "tuple[Ports, ...]" = ()
+    """The same ports as the facets see them that waves only reach through slabs: for each set of
+    slabs, with what they insert in the pattern."""
+
+    @property
+    def ways(self) -> "tuple[Ports, ...]":
+        """The ports as all facets see them: past everything, then through slabs."""
+        return replace(self, behind_slabs=()), *self.behind_slabs
+
+    def part(self, some: slice) -> "Ports":
+        """Choose some of the ports."""
+        return replace(
+            self,
+            positions=self.positions[some],
+            visible=self.visible[some],
+            behind_slabs=tuple(one.part(some) for one in self.behind_slabs),
+        )
 
 
 def isotropic(

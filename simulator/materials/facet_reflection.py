@@ -19,6 +19,7 @@ difference, what a conductor reflects, is :math:`2 (\hat m \cdot \hat e_t)(\hat 
 one, and the shares themselves do not matter.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -197,16 +198,42 @@ def reflection_nodes(
     """
     if isinstance(material, Conductor):
         return 1
+    return node_count(
+        lambda points, cosines: reflection(material, points, cosines),
+        start,
+        stop,
+        lowest=lowest,
+        accuracy=accuracy,
+    )
+
+
+def node_count(
+    coefficients: Callable[[Float[np.ndarray, " freqs"], Float[np.ndarray, " n"]], Coefficients],
+    start: float,
+    stop: float,
+    *,
+    lowest: float = STEEP,
+    accuracy: float = ACCURACY,
+) -> int:
+    """Count the Chebyshev nodes over a band that interpolate coefficients of a slab.
+
+    Parameters
+    ----------
+    coefficients
+        Of frequencies and cosines of incidence.
+    start, stop, lowest, accuracy
+        As for :func:`reflection_nodes`, which tells what is raised.
+    """
     cosines = np.linspace(lowest, 1.0, 15)
     # Five points between two nodes; none of them is one.
     points = np.linspace(start, stop, 5 * NODE_COUNTS[-1] + 1)
-    exact = np.concatenate(reflection(material, points, cosines))
+    exact = np.concatenate(coefficients(points, cosines))
     worst = np.inf
     for count in NODE_COUNTS:
         nodes = chebyshev_nodes(start, stop, count)
-        sampled = np.concatenate(reflection(material, nodes, cosines))
+        sampled = np.concatenate(coefficients(nodes, cosines))
         worst = float(np.abs(sampled @ barycentric_basis(nodes, points) - exact).max())
-        if worst <= ACCURACY:
+        if worst <= accuracy:
             return count
     if worst <= COARSEST or lowest < STEEP:
         return NODE_COUNTS[-1]

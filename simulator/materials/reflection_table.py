@@ -1,9 +1,10 @@
 """Reflection coefficients of many facets at many frequencies, interpolated over the angle."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex64, Float, Float32, Int
+from jaxtyping import Complex, Complex64, Float, Float32, Int
 
 from scenes.schema.radio import Polarization
 from simulator.materials.fresnel_slab import Conductor, Material, reflection
@@ -77,6 +78,24 @@ def reflection_table(
         return ReflectionTable(
             samples=np.full((frequencies.size, 1), -1.0 if vertical else 1.0, np.complex64)
         )
+    return tabulated(exact_at, frequencies)
+
+
+def tabulated(
+    exact_at: Callable[
+        [Float[np.ndarray, " n"], Float[np.ndarray, " m"]], Complex[np.ndarray, "m n"]
+    ],
+    frequencies: Float[np.ndarray, " freqs"],
+) -> ReflectionTable:
+    """Tabulate a coefficient of frequency and cosine at the fewest angles that do.
+
+    Parameters
+    ----------
+    exact_at
+        The coefficient.
+    frequencies
+        Any grid. [Hz]
+    """
     some = frequencies[:: max(1, frequencies.size // 8)]
     count = 64
     while count < MOST_ANGLES:

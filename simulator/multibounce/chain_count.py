@@ -1,12 +1,13 @@
 """Chains of surfaces in two dimensions: which there are, and how much work they make."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from scenes.schema.errors import ScenarioError
 from simulator.geometry.faces import Face
+from simulator.visibility.mutual_visibility import MutualVisibility
 
 MOST_LINKS = 2**35
 """Most links between facets over all chains: at a hundred frequencies and some 5 ns each, an hour
@@ -18,8 +19,8 @@ PORTS_PER_LINK = 32
 OUTLINE = 64
 """Points that stand for a surface where only its directions are asked for. [-]"""
 
-Sees = Callable[[Face, Face], Bool[np.ndarray, "one other"]]
-"""Tells which facets of two faces see each other."""
+Sees = MutualVisibility
+"""Tells which facets of two faces see each other, and through what."""
 
 
 def chains_to(
@@ -34,7 +35,7 @@ def chains_to(
     faces
         Sides of the surfaces.
     sees
-        Their mutual visibility.
+        Their mutual visibility, past everything or through slabs.
     seen_directly
         Which faces may come first.
     most
@@ -48,7 +49,7 @@ def chains_to(
     if most < 1:
         return
     for place, face in enumerate(faces):
-        if face.surface == faces[target].surface or not sees(face, faces[target]).any():
+        if face.surface == faces[target].surface or not sees.sights(face, faces[target]):
             continue
         if seen_directly[place]:
             yield (place,)

@@ -219,8 +219,8 @@ class _Target:
             leg.sequence,
             sight.positions,
             centre[None],
-            blocked=partial(blocked, self.scene.rays),
-            clearance=self.scene.rays.clearance,
+            blocked=partial(blocked, self.scene.rays_to_all),
+            clearance=self.scene.rays_to_all.clearance,
         ).valid[:, 0]
         if not seen.any():
             return None

@@ -183,7 +183,9 @@ def facets_within_reach(
     if not reached.any():
         return nothing
     of_owner = np.flatnonzero(facets.material == scene.scattering.index(owner))
-    limit: float = ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough] + scene.rays.clearance
+    limit: float = (
+        ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough] + scene.rays_to_all.clearance
+    )
     kept = []
     for some in np.array_split(of_owner, 1 + of_owner.size // FACETS_AT_ONCE):
         centres = facets.centres[some]
@@ -275,15 +277,15 @@ def _traced(
         return np.zeros((len(sight.positions), len(points)), dtype=bool)
     mirrors = scene.mirrors.mirrors
     side = np.sign(mirrors.heights(leg.image(sight).centre[None], chain.rough)[0])
-    lift = scene.rays.clearance + ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough]
+    lift = scene.rays_to_all.clearance + ROUGHNESS_CLEARANCE * mirrors.rms_heights[chain.rough]
     offset = lift * side * mirrors.normals[chain.rough]
     valid: np.ndarray = trace_chain(
         mirrors,
         leg.sequence,
         sight.positions,
         points,
-        blocked=partial(blocked, scene.rays),
-        clearance=scene.rays.clearance,
+        blocked=partial(blocked, scene.rays_to_all),
+        clearance=scene.rays_to_all.clearance,
         receiver_offsets=np.broadcast_to(offset, points.shape),
     ).valid
     return valid
@@ -322,7 +324,7 @@ def _look(
     if facets is None:
         raise ValueError("the scene has no facets; give a scene with a scattering object")
     return Sightlines(
-        rays=scene.rays,
+        rays=scene.rays_to_all,
         facets=facets,
         senders=sight.positions,
         receivers=sight.positions,

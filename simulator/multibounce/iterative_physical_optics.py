@@ -18,9 +18,9 @@ in the middle of the contributions' is taken out, the field varies slowly with f
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex64, Float, Float32, Int
@@ -30,9 +30,11 @@ from threadpoolctl import threadpool_limits
 from estimator.compute.engine import thread_count
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
-from simulator.materials.reflection_table import reflection_table
+from simulator.materials.insertion_table import InsertionTable
+from simulator.materials.reflection_table import Angles, reflection_table
 from simulator.multibounce.rough_faces import half_angle_cosines, rough_sources
 from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_planned
+from simulator.visibility.mutual_visibility import Sight
 
 COLUMNS_AT_ONCE = 1024
 """Facets of a target whose single links with a block of a wall are prepared together."""
@@ -206,7 +208,7 @@ def onward(
     wave: Wave,
     wall: Face,
     target: Face,
-    seen: Bool[np.ndarray, "wall target"],
+    sight: Sight,
     bounds: Bounds,
     nodes: Float[np.ndarray, " nodes"],
 ) -> Wave:
@@ -216,14 +218,14 @@ def onward(
     ----------
     wave
         What arrives at the wall: at these nodes, or the same at all frequencies.
-    wall, target, seen
-        The two faces, and which of their facets see each other.
+    wall, target, sight
+        The two faces, which of their facets see each other, and the slabs between these.
     bounds
         Lengths of the paths, after :func:`onward_bounds`.
     nodes
         Frequencies. [Hz]
     """
-    ports, columns = len(bounds.shortest), target.count
+    seen, ports, columns = sight.seen, len(bounds.shortest), target.count
     shape = (nodes.size, ports, columns)
     strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
     # The mirror that would lead from the ports to the middle of what is seen of the target.
@@ -231,7 +233,10 @@ def onward(
     table = reflection_table(wall.material, nodes, polarization=wall.polarization)
     incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
     plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
-    single = _SingleLinks.left_by(plan, wall, target)
+    if sight.crossings:  # each two facets have their own angle at the slabs
+        plan = replace(plan, pairs=(), left=seen, by_sender={}, by_receiver={})
+    slabs = [InsertionTable.of(one, nodes, wall.polarization) for one in sight.crossings]
+    single = _SingleLinks.left_by(plan, wall, target, slabs)
     sizes, outward, inward = (
         values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
     )
@@ -260,7 +265,7 @@ def onward(
         for some in single:
             sideways = None if across is None else across[:, some.rows]
             received = some.received(
-                monopoles[:, some.rows], dipoles[:, some.rows], sideways, frequency
+                monopoles[:, some.rows], dipoles[:, some.rows], sideways, nodes, node
             )
             field[:, some.columns] += received[0]
             along_normal[:, some.columns] += received[1]
@@ -288,16 +293,21 @@ class _SingleLinks:
     leaves: Float32[np.ndarray, "wall target"]  # cosine to the wall's normal
     aside: Float32[np.ndarray, "wall target"] | None  # along it, if it is rough
     arrives: Float32[np.ndarray, "wall target"]  # cosine to the target's
+    slabs: Sequence[tuple[InsertionTable, Angles]]  # on the way, and at which angles
 
     @classmethod
-    def left_by(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterable[_SingleLinks]":
+    def left_by(
+        cls, plan: LinkPlan, wall: Face, target: Face, slabs: Sequence[InsertionTable]
+    ) -> "Iterable[_SingleLinks]":
         """Prepare the links that the blocks leave, some at a time; once, unless too many."""
         if int(plan.left.sum()) > LINKS_HELD:
-            return _Anew(lambda: cls._prepared(plan, wall, target))
-        return list(cls._prepared(plan, wall, target))
+            return _Anew(lambda: cls._prepared(plan, wall, target, slabs))
+        return list(cls._prepared(plan, wall, target, slabs))
 
     @classmethod
-    def _prepared(cls, plan: LinkPlan, wall: Face, target: Face) -> "Iterator[_SingleLinks]":
+    def _prepared(
+        cls, plan: LinkPlan, wall: Face, target: Face, slabs: Sequence[InsertionTable]
+    ) -> "Iterator[_SingleLinks]":
         for sender in plan.senders:
             left = plan.left[sender.members]
             rows, columns = sender.members[left.any(axis=1)], np.flatnonzero(left.any(axis=0))
@@ -314,14 +324,16 @@ class _SingleLinks:
                 if wall.rough.any():
                     tangents = wall.normals[rows][:, ::-1] * np.array([-1.0, 1.0])
                     aside = np.einsum("wqx,wx->wq", direction, tangents).astype(np.float32)
+                longer = sum((slab.bending(direction, distance) for slab in slabs), 0.0)
                 yield cls(
                     rows=rows,
                     columns=some,
-                    distance=distance,
+                    distance=distance + longer,
                     spreading=links.astype(np.float32),
                     leaves=leaves.astype(np.float32),
                     aside=aside,
                     arrives=arrives.astype(np.float32),
+                    slabs=[(slab, slab.places(direction)) for slab in slabs],
                 )
 
     def received(
@@ -329,10 +341,13 @@ class _SingleLinks:
         monopoles: Complex64[np.ndarray, "ports wall"],
         dipoles: Complex64[np.ndarray, "ports wall"],
         across: Complex64[np.ndarray, "ports wall"] | None,
-        frequency: float,
+        nodes: Float[np.ndarray, " nodes"],
+        node: int,
     ) -> tuple[Complex64[np.ndarray, "ports target"], Complex64[np.ndarray, "ports target"]]:
         """Sum the field, and the field times the cosine at the target."""
-        links = self.spreading * phasor(self.distance * (-frequency / speed_of_light))
+        links = self.spreading * phasor(self.distance * (-float(nodes[node]) / speed_of_light))
+        for slab, angles in self.slabs:
+            links = links * slab.table.at(angles, node)
         turned = links * self.leaves
         strength = monopoles @ links + dipoles @ turned
         slope = monopoles @ (links * self.arrives) + dipoles @ (turned * self.arrives)

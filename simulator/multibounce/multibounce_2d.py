@@ -20,9 +20,8 @@ What is neglected: several scatterings within one object, diffraction around an 
 its lit facets radiate, and the near field of facets closer to each other than a wavelength.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -45,7 +44,7 @@ from simulator.multibounce.iterative_physical_optics import (
     Wave,
     direct,
 )
-from simulator.multibounce.passage import Link, Passage, passage_over
+from simulator.multibounce.passage import Link, Passage, passages_over
 from simulator.multibounce.rough_faces import rough_factor, unit
 
 WAVE_BYTES = 2**29
@@ -102,27 +101,28 @@ def ghost_echo(
     echo = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     if max_bounces < 2:
         return echo
-    seen_directly = [bool(array.visible[:, face.source].any()) for face in faces]
+    ways = array.ways
+    seen_directly = [any(w.visible[:, face.source].any() for w in ways) for face in faces]
     cuts: list[tuple[Face, list[Link]]] = []
     for place, target in enumerate(faces):
-        passages = {
-            chain: found
+        passages = [
+            (chain, found)
             for chain in chains_to(place, faces, sees, seen_directly, max_bounces // 2)
-            if (
-                found := passage_over(
-                    array, [faces[one] for one in chain], target, sees, frequencies
-                )
+            for ports in ways
+            for found in passages_over(
+                ports, [faces[one] for one in chain], target, sees, frequencies
             )
-        }
-        links = _echo_links(passages, place, max_bounces, direct_back=seen_directly[place])
+        ]
+        directly = [w for w in ways if w.visible[:, target.source].any()]
+        links = _echo_links(passages, place, max_bounces, directly)
         if links:
-            used = {id(one): one for link in links for one in (link.out, link.back) if one}
+            used = _passages_of(links)
             met = np.flatnonzero(
-                np.any([one.seen[-1].any(axis=0) for one in used.values()], axis=0)
+                np.any([one.sights[-1].seen.any(axis=0) for one in used.values()], axis=0)
             )
-            parts = {key: one.part(met) for key, one in used.items()}
+            parts: dict[int, Passage] = {key: one.part(met) for key, one in used.items()}
             links = [
-                Link(link.factor, parts[id(link.out)], link.back and parts[id(link.back)])
+                Link(link.factor, parts[id(link.out)], parts.get(id(link.back), link.back))
                 for link in links
             ]
             cuts.append((target.part(met), links))
@@ -137,12 +137,17 @@ def ghost_echo(
     return echo
 
 
+def _passages_of(links: Sequence[Link]) -> dict[int, Passage]:
+    """Return the passages of links, each once, by their identity."""
+    ends = (one for link in links for one in (link.out, link.back))
+    return {id(one): one for one in ends if isinstance(one, Passage)}
+
+
 def _echo_links(
-    passages: Mapping[tuple[int, ...], Passage],
+    passages: Sequence[tuple[tuple[int, ...], Passage]],
     place: int,
     max_bounces: int,
-    *,
-    direct_back: bool,
+    directly: Sequence[Ports],
 ) -> list[Link]:
     """Pair the ways to a target: each chain of surfaces once, with the way it is run through back.
 
@@ -151,20 +156,19 @@ def _echo_links(
     surfaces are met in their order, at the later of them.
     """
     links = []
-    for (i, (out, to)), (j, (back, fro)) in combinations_with_replacement(
-        enumerate(passages.items()), 2
-    ):
+    for (i, (out, to)), (j, (back, fro)) in combinations_with_replacement(enumerate(passages), 2):
         if len(out) == len(back) and 2 * len(out) + 1 <= max_bounces:
             links.append(Link(1.0 + (i != j), to, fro))
         for longer, shorter, one, other in ((out, back, to, fro), (back, out, fro, to)):
             even = len(longer) == len(shorter) + 1 and 2 * len(longer) <= max_bounces
             if even and longer[-1] < place:
                 links.append(Link(2.0, one, other))
-    if direct_back and max_bounces >= 2:
+    if max_bounces >= 2:
         links += [
-            Link(2.0, one, None)
-            for chain, one in passages.items()
+            Link(2.0, one, ports)
+            for chain, one in passages
             if len(chain) == 1 and chain[0] < place
+            for ports in directly
         ]
     return links
 
@@ -201,16 +205,18 @@ def uplink_over_surfaces(
     S-parameter at each element; with cylindrical waves, field per unit line source. [-]
     """
     pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
-    seen_directly = [bool(user.visible[:, face.source].any()) for face in faces]
+    seen_directly = [any(w.visible[:, face.source].any() for w in user.ways) for face in faces]
     chains = [
         (*chain, place)
         for place, last in enumerate(faces)
-        if array.visible[:, last.source].any()
+        if any(w.visible[:, last.source].any() for w in array.ways)
         for chain in chains_to(place, faces, sees, seen_directly, max_bounces - 1)
     ]
     for done, chain in enumerate(sorted(chains, key=lambda one: (len(one), one)), start=1):
         met = [faces[one] for one in chain]
-        pilot += _pilot_over(met, sees, user, array, frequencies, waves, interpolate)
+        for sender in user.ways:
+            for receiver in array.ways:
+                pilot += _pilot_over(met, sees, sender, receiver, frequencies, waves, interpolate)
         progress(done, len(chains))
     return pilot
 
@@ -228,17 +234,18 @@ def _echo_of(
 
     Yields which ports, how many facets, and their sum.
     """
-    total = _few_frequencies(target, links, frequencies, 2 * array.nodes, interpolate)
-    passages = {id(one): one for link in links for one in (link.out, link.back) if one}
+    total = _few_frequencies(target, links, frequencies, interpolate)
+    passages = _passages_of(links)
+    ports_of = {id(link.back): link.back for link in links if isinstance(link.back, Ports)}
     # At walls that others precede, waves vary with frequency; those at the first are small.
     held = sum(one.walls[-1].count for one in passages.values() if len(one.walls) > 1)
     ports, at_once = len(array.positions), max(1, WAVE_BYTES // (16 * total.nodes.size))
     for row in range(0, ports, max(1, at_once // max(1, held))):
         rows = slice(row, min(row + max(1, at_once // max(1, held)), ports))
-        antennas = replace(array, positions=array.positions[rows], visible=array.visible[rows])
+        antennas = {key: one.part(rows) for key, one in ports_of.items()}
         some = {key: one.of_ports(rows) for key, one in passages.items()}
         sent = {key: one.at_last_wall(total.nodes) for key, one in some.items()}
-        width = len(antennas.positions) * len(passages)
+        width = (rows.stop - rows.start) * len(passages)
         step = max(1, min(FACETS_AT_ONCE, at_once // width))
         for first in range(0, target.count, step):
             block = slice(first, min(first + step, target.count))
@@ -247,16 +254,11 @@ def _echo_of(
                 key: one.part(block).arriving(sent[key], here, total.nodes)
                 for key, one in some.items()
             }
-            directly = direct(here, antennas, total.nodes)
+            arriving |= {key: direct(here, one, total.nodes) for key, one in antennas.items()}
             pairs = [
-                (
-                    link.factor,
-                    arriving[id(link.out)],
-                    directly if link.back is None else arriving[id(link.back)],
-                )
-                for link in links
+                (link.factor, arriving[id(link.out)], arriving[id(link.back)]) for link in links
             ]
-            linked = _linked(here, pairs, len(antennas.positions), total, waves)
+            linked = _linked(here, pairs, rows.stop - rows.start, total, waves)
             yield rows, here.count, linked
 
 
@@ -264,10 +266,10 @@ def _few_frequencies(
     target: Face,
     links: Sequence[Link],
     frequencies: Float[np.ndarray, " freqs"],
-    pattern_nodes: int,
     interpolate: bool,
 ) -> FewFrequencies | EveryFrequency:
     """Choose the frequencies that do for all chains which are cut at one target."""
+    extra = max(link.nodes for link in links)
     spreads: dict[tuple[int, ...], float] = {}
     materials: dict[tuple[int, ...], list[Material]] = {}
     for link in links:
@@ -276,7 +278,7 @@ def _few_frequencies(
         spreads[key] = max(spreads.get(key, 0.0), link.spread)
         materials[key] = made
     choices = [
-        few_frequencies(frequencies, spread, materials[key], pattern_nodes, interpolate)
+        few_frequencies(frequencies, spread, materials[key], extra, interpolate)
         for key, spread in spreads.items()
     ]
     return max(choices, key=lambda choice: choice.nodes.size)
@@ -292,18 +294,19 @@ def _pilot_over(
     interpolate: bool,
 ) -> Complex[np.ndarray, "ports freqs"]:
     """Take the user's wave over all surfaces of a chain to the array."""
-    nothing = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
+    pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     target = chain[-1]
     target = target.part(np.flatnonzero(array.visible[:, target.source].any(axis=0)))
-    passage = passage_over(user, chain[:-1], target, sees, frequencies)
-    if passage is None:
-        return nothing
+    if target.count == 0:
+        return pilot
     materials = [face.material for face in chain]
-    extra = user.nodes + array.nodes
-    total = few_frequencies(frequencies, passage.spread, materials, extra, interpolate)
-    wave = passage.arriving(passage.at_last_wall(total.nodes), target, total.nodes)
-    heard = direct(target, array, total.nodes)
-    return _linked(target, [(1.0, wave, heard)], len(array.positions), total, waves)
+    for passage in passages_over(user, chain[:-1], target, sees, frequencies):
+        extra = passage.nodes + array.nodes
+        total = few_frequencies(frequencies, passage.spread, materials, extra, interpolate)
+        wave = passage.arriving(passage.at_last_wall(total.nodes), target, total.nodes)
+        heard = direct(target, array, total.nodes)
+        pilot += _linked(target, [(1.0, wave, heard)], len(array.positions), total, waves)
+    return pilot
 
 
 def _linked(

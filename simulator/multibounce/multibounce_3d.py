@@ -17,6 +17,8 @@ chains of two targets of which the earlier is curved.
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -28,6 +30,7 @@ from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.patches import cut_into_patches, patch_side
 from simulator.geometry.ray_scene import blocked
 from simulator.materials.facet_reflection import reflection_nodes
+from simulator.materials.slab_insertion import LEAST_LEVEL, passage_level, passage_nodes
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
@@ -35,7 +38,7 @@ from simulator.scene.scene_mirrors import SceneMirrors
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import trace_chain, unfolded_chain
 from simulator.specular.image_sources import DIRECT, Leg, LegReflection
-from simulator.specular.path_field import reflected_field
+from simulator.specular.path_field import Through, reflected_field
 from simulator.visibility.seen import Seen
 
 NUDGE = np.array([2e-5, 1.4e-5, 0.9e-5])
@@ -100,6 +103,13 @@ def coherent_echo(
     return np.asarray(echo + _over_mirrors_alone(scene, among, send, receive))
 
 
+class _Sight(NamedTuple):
+    """Patches that antennas see over a leg through the same slabs."""
+
+    through: Through
+    seen: Bool[np.ndarray, "links patches"]
+
+
 @dataclass(frozen=True)
 class _Target:
     scene: RadioScene
@@ -125,19 +135,8 @@ class _Target:
             np.flatnonzero(chosen),
             patch_side(facets, float(frequencies[-1] - frequencies[0])),
         )
-        seen = self._seen(out, self.send, patches.order, patches.first)
-        if not same:
-            seen = seen & self._seen(back, self.receive, patches.order, patches.first)
-        if not seen.any():
-            return nothing
         patch_of = np.full(facets.count, -1)
         patch_of[patches.order] = np.repeat(np.arange(patches.count), np.diff(patches.first))
-        mirrors = [*out.sequence, *back.sequence]
-        start, stop = float(frequencies[0]), float(frequencies[-1])
-        nodes = 3  # the loss of roughness
-        for mirror in mirrors:
-            material = self.mirrors.materials[mirror]
-            nodes += reflection_nodes(material, start, stop, accuracy=COEFFICIENT_ACCURACY) - 1
         places = sent.positions
         links = Links(
             senders=places,
@@ -145,24 +144,44 @@ class _Target:
             sent=sent.pattern,
             received=sent.pattern if same else heard.pattern,
         )
-        spectrum: np.ndarray = scattered_by_patches(
-            facets,
-            links,
-            partial(_look_up, seen, patch_of),
-            frequencies,
-            chosen=chosen,
-            factor=LegReflection(mirrors=self.mirrors, out=out, back=back),
-            factor_nodes=nodes,
-        )
+        there = self._sights(out, self.send, patches.order, patches.first)
+        here = there if same else self._sights(back, self.receive, patches.order, patches.first)
+        spectrum = nothing
+        for one, other in product(there, here):
+            seen = one.seen & other.seen
+            if not seen.any():
+                continue
+            spectrum += scattered_by_patches(
+                facets,
+                links,
+                partial(_look_up, seen, patch_of),
+                frequencies,
+                chosen=chosen,
+                factor=LegReflection(
+                    mirrors=self.mirrors, out=out, back=back, through=(one.through, other.through)
+                ),
+                factor_nodes=self._nodes(out, back, (one.through, other.through)),
+            )
         return spectrum
 
-    def _seen(
+    def _nodes(self, out: Leg, back: Leg, through: tuple[Through, Through]) -> int:
+        """Count the frequencies at which mirrors and slabs have to be known."""
+        frequencies = self.scene.scenario.radio.frequencies
+        start, stop = float(frequencies[0]), float(frequencies[-1])
+        nodes = 3  # the loss of roughness
+        for mirror in (*out.sequence, *back.sequence):
+            material = self.mirrors.materials[mirror]
+            nodes += reflection_nodes(material, start, stop, accuracy=COEFFICIENT_ACCURACY) - 1
+        slabs = [one for leg in through for part in leg for one in part]
+        return nodes + passage_nodes(slabs, start, stop) - 1
+
+    def _sights(
         self,
         leg: Leg,
         sight: AntennaGroup,
         order: Int[np.ndarray, " facets"],
         first: Int[np.ndarray, " patches_and_one"],
-    ) -> Bool[np.ndarray, "links patches"]:
+    ) -> list[_Sight]:
         """Trace one facet of each patch over a leg, from every antenna: what faces them most."""
         facets = self.facets.part(order)
         towards = leg.image(sight).centre - facets.centres
@@ -181,8 +200,20 @@ class _Target:
             blocked=partial(blocked, self.scene.rays),
             clearance=self.scene.rays.clearance,
             receiver_offsets=self.scene.rays.clearance * facets.mean_normals[best],
+            slabs=self.scene.slabs,
         )
-        return chain.valid
+        if chain.crossed is None:
+            return [_Sight((), chain.valid)]
+        sights = []
+        frequencies = self.scene.scenario.radio.frequencies
+        kinds, kind = np.unique(chain.crossed, axis=0, return_inverse=True)
+        for index, sets in enumerate(kinds.tolist()):
+            through = tuple(self.scene.slabs.crossings(one) for one in sets)
+            if passage_level([one for part in through for one in part], frequencies) >= LEAST_LEVEL:
+                seen = np.zeros(chain.valid.shape, dtype=bool)
+                seen[chain.valid] = kind.ravel() == index
+                sights.append(_Sight(through, seen))
+        return sights
 
 
 def _look_up(
@@ -220,22 +251,29 @@ def _over_mirrors_alone(
         if gains.max(initial=0.0) < LEVEL * peak:
             continue
         some = np.flatnonzero(gains >= LEVEL * peak)
-        shares = _shares(scene, mirrors, leg, send.positions[some], receive.positions[some])
-        some, shares = some[shares > 0.0], shares[shares > 0.0]
+        shares, crossed = _shares(
+            scene, mirrors, leg, send.positions[some], receive.positions[some]
+        )
+        some, shares, crossed = some[shares > 0.0], shares[shares > 0.0], crossed[shares > 0.0]
         if some.size == 0:
             continue
-        chain = unfolded_chain(
-            mirrors, leg.sequence, image.positions[some], receive.positions[some], paired=True
-        )
-        field = reflected_field(
-            mirrors,
-            chain,
-            frequencies,
-            sent=send.pattern.polarization,
-            received=receive.pattern.polarization,
-        )
-        wave = direct_wave(lengths[some], frequencies, waves="spherical")
-        echo[some] += (shares * gains[some])[:, None] * field * wave
+        kinds, kind = np.unique(crossed, axis=0, return_inverse=True)
+        for index, sets in enumerate(kinds.tolist()):
+            alike = np.flatnonzero(kind.ravel() == index)
+            here = some[alike]
+            chain = unfolded_chain(
+                mirrors, leg.sequence, image.positions[here], receive.positions[here], paired=True
+            )
+            field = reflected_field(
+                mirrors,
+                chain,
+                frequencies,
+                sent=send.pattern.polarization,
+                received=receive.pattern.polarization,
+                through=tuple(scene.slabs.crossings(one) for one in sets),
+            )
+            wave = direct_wave(lengths[here], frequencies, waves="spherical")
+            echo[here] += (shares[alike] * gains[here])[:, None] * field * wave
     return echo
 
 
@@ -245,26 +283,28 @@ def _shares(
     leg: Leg,
     sources: Float[np.ndarray, "links 3"],
     receivers: Float[np.ndarray, "links 3"],
-) -> Float[np.ndarray, " links"]:
+) -> tuple[Float[np.ndarray, " links"], Int[np.ndarray, "links legs"]]:
     """Tell which paths a leg has, 0 or 1; where it just has one, one half.
 
     Between two walls at right angles the way back to the antenna meets their very edge. Both
     orders of the walls then count half, as physical optics has it: half of the Fresnel zone lies
-    on either wall.
+    on either wall. With it, the sets of slabs on each part of the way.
     """
-    found = [
-        np.diagonal(
-            trace_chain(
-                mirrors,
-                leg.sequence,
-                sources,
-                receivers + side * NUDGE,
-                blocked=partial(blocked, scene.rays),
-                clearance=scene.rays.clearance,
-                paired=True,
-            ).valid
+    shares = np.zeros(len(sources))
+    crossed = np.zeros((len(sources), leg.bounces + 1), dtype=np.int64)
+    for side in (1.0, -1.0):
+        chain = trace_chain(
+            mirrors,
+            leg.sequence,
+            sources,
+            receivers + side * NUDGE,
+            blocked=partial(blocked, scene.rays),
+            clearance=scene.rays.clearance,
+            paired=True,
+            slabs=scene.slabs,
         )
-        for side in (1.0, -1.0)
-    ]
-    shares: np.ndarray = np.mean(found, axis=0)
-    return shares
+        valid = np.diagonal(chain.valid)
+        shares += 0.5 * valid
+        if chain.crossed is not None:
+            crossed[valid] = chain.crossed
+    return shares, crossed

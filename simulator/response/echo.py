@@ -11,6 +11,7 @@ from simulator.geometry.facets import Facets
 from simulator.geometry.ray_scene import facets_visible
 from simulator.multibounce.multibounce_2d import SeveralProgress, ghost_echo, untold
 from simulator.multibounce.multibounce_3d import echo_over_mirrors
+from simulator.response.over_one_surface import over_one_surface
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scattering.physical_optics import scattered
 from simulator.scene.array_antennas import array_group, in_space, sending_group
@@ -57,9 +58,7 @@ def simulate_echo(
     if station.transmit_offset is not None:
         places = scene.elements + station.transmit_offset
         senders = facet_ports(scene, scene.facets, station.antenna, places)
-    echo: np.ndarray = scattered(
-        scene.facets, senders, array, frequencies, waves=scenario.waves, advance=advance
-    )
+    echo = over_one_surface(scene, scene.facets, senders, array, advance=advance)
     if not scene.facets.flat or senders is not array:
         return echo
     ghosts: np.ndarray = ghost_echo(

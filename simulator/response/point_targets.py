@@ -17,14 +17,18 @@ from scipy.constants import speed_of_light
 from scenes.scenario import User
 from scenes.schema.antenna import Antenna
 from simulator.antennas.field_pattern import field_gain
-from simulator.antennas.polarization import antenna_polarization
+from simulator.antennas.polarization import Polarization, antenna_polarization
 from simulator.geometry.ray_scene import blocked
+from simulator.geometry.slabs import sets_among
+from simulator.materials.slab_insertion import along_field, through_slabs
 from simulator.scene.radio_scene import RadioScene
 
 
 class _Leg(NamedTuple):
     axis: Float[np.ndarray, " 3"]  # of the antenna's polarization
-    gains: Float[np.ndarray, " places"]  # of the antenna, 0 where the point is hidden [-]
+    gains: Complex[np.ndarray, "places freqs"]
+    """Of the antenna and of slabs on the way, 0 where the point is hidden. [-]"""
+
     distances: Float[np.ndarray, " places"]  # [m]
 
 
@@ -83,10 +87,40 @@ def _leg(
     towards = point - places
     distances = np.linalg.norm(towards, axis=-1)
     gains = field_gain(antenna, aims, towards / distances[:, None])
-    hidden = blocked(scene.rays, places, np.broadcast_to(point, places.shape))
-    return _Leg(
-        antenna_polarization(antenna, aims[0]).axis, np.where(hidden, 0.0, gains), distances
-    )
+    ends = np.broadcast_to(point, places.shape)
+    hidden = blocked(scene.rays, places, ends)
+    axis = antenna_polarization(antenna, aims[0]).axis
+    frequencies = scene.scenario.radio.frequencies
+    fields = np.where(hidden, 0.0, gains)[:, None] * np.ones(frequencies.size, dtype=np.complex128)
+    crossed = scene.slabs.crossed(places, ends)
+    for slabs in sets_among(crossed, ~hidden):
+        some = np.flatnonzero(crossed == slabs)
+        ways = towards[some] / distances[some, None]
+        fields[some] *= _inserted(scene, slabs, ways, distances[some], axis)
+    return _Leg(axis, fields, distances)
+
+
+def _inserted(
+    scene: RadioScene,
+    slabs: int,
+    ways: Float[np.ndarray, "some 3"],
+    distances: Float[np.ndarray, " some"],
+    axis: Float[np.ndarray, " 3"],
+) -> Complex[np.ndarray, "some freqs"]:
+    """Return what slabs leave of a leg's field. [-]."""
+    scenario, crossings = scene.scenario, scene.slabs.crossings(slabs)
+    frequencies = scenario.radio.frequencies
+    if scenario.dimensions == 2:
+        return through_slabs(
+            crossings,
+            ways,
+            distances,
+            frequencies,
+            vertical=scenario.radio.polarization == "vertical",
+            cylindrical=False,
+        )
+    field = Polarization(axis=axis, cross_polar=0.0).field(ways)
+    return along_field(crossings, ways, distances, frequencies, field)
 
 
 def _link(
@@ -95,9 +129,9 @@ def _link(
     frequencies = scene.scenario.radio.frequencies
     wavelengths = speed_of_light / frequencies
     match = float((outward.axis * back.axis).sum())
-    spread = match * outward.gains * back.gains / (outward.distances * back.distances)
+    spread = (match / (outward.distances * back.distances))[:, None]
     amplitude = wavelengths * np.sqrt(cross_section) / (4 * np.pi) ** 1.5
     turns = (outward.distances + back.distances)[:, None] / wavelengths
     phase = np.exp(-2j * np.pi * np.remainder(turns, 1.0))
-    link: np.ndarray = spread[:, None] * amplitude * phase
+    link: np.ndarray = spread * outward.gains * back.gains * amplitude * phase
     return link

@@ -1,15 +1,28 @@
 """Links over the facets of a scene in space, of any number: in reach, seen, and summed."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from jaxtyping import Complex
+from jaxtyping import Complex, Float
 
 from simulator.antennas.beam_culling import AntennaGroup, in_reach
 from simulator.antennas.links import Links
+from simulator.materials.slab_insertion import (
+    LEAST_LEVEL,
+    Crossing,
+    along_field,
+    passage_level,
+    passage_nodes,
+)
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.visibility.shaft_culling import Sightlines, object_shape, scenario_obstacles
+from simulator.visibility.slab_sights import SlabSights
+
+PAIRS_AT_ONCE = 200_000
+"""Links times patches whose slabs' coefficients are worked out in one go. [-]"""
 
 
 def scattered_in_space(
@@ -35,33 +48,98 @@ def scattered_in_space(
     S-parameter of each link. [-]
     """
     frequencies = scene.scenario.radio.frequencies
+    spectrum = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
     if scene.facets is None:
-        return np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
+        return spectrum
     receivers, senders = receive.positions, send.positions
     if send is not receive:
         senders = np.broadcast_to(senders, receivers.shape)
-    spectrum: np.ndarray = scattered_by_patches(
-        scene.facets,
-        Links(senders=senders, receivers=receivers, sent=send.pattern, received=receive.pattern),
-        sightlines(scene, send, receive),
-        frequencies,
-        chosen=in_reach([(send, receive)], scene.facets.centres, 0.0),
-        advance=advance,
+    links = Links(senders=senders, receivers=receivers, sent=send.pattern, received=receive.pattern)
+    lines = sightlines(scene, send, receive)
+    chosen = in_reach([(send, receive)], scene.facets.centres, 0.0)
+    if not len(scene.slabs):
+        return np.asarray(
+            scattered_by_patches(
+                scene.facets, links, lines, frequencies, chosen=chosen, advance=advance
+            )
+        )
+    start, stop = float(frequencies[0]), float(frequencies[-1])
+    sights = SlabSights(
+        slabs=scene.slabs,
+        sightlines=lines,
+        chosen=np.flatnonzero(chosen),
+        convex=[_own_faces(scene, name) for name in scene.scattering],
     )
+    for number, pair in enumerate(sights.pairs):
+        out, back = (scene.slabs.crossings(one) for one in pair)
+        if passage_level((*out, *back), frequencies) < LEAST_LEVEL:
+            continue
+        nodes = passage_nodes((*out, *back), start, stop)
+        spectrum += scattered_by_patches(
+            scene.facets,
+            links,
+            partial(sights.over, pair),
+            frequencies,
+            chosen=sights.may_be(pair),
+            factor=_Insertion(out, back) if out or back else None,
+            factor_nodes=nodes,
+            advance=advance if number == 0 else _nobody,
+        )
     return spectrum
 
 
+@dataclass(frozen=True)
+class _Insertion:
+    """What slabs on either leg multiply to the sum over a patch, at its centre."""
+
+    out: tuple[Crossing, ...]
+    back: tuple[Crossing, ...]
+
+    def __call__(
+        self,
+        links: Links,
+        centres: Float[np.ndarray, "patches 3"],
+        nodes: Float[np.ndarray, " nodes"],
+    ) -> Complex[np.ndarray, "patches links nodes"]:
+        total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
+        for slabs, places, polarization in (
+            (self.out, links.senders, links.sent.polarization),
+            (self.back, links.receivers, links.received.polarization),
+        ):
+            at_once = max(1, PAIRS_AT_ONCE // max(1, len(centres)))
+            for first in range(0, len(places) if slabs else 0, at_once):
+                some = slice(first, first + at_once)
+                towards = (centres[:, None] - places[some]).reshape(-1, 3)
+                lengths = np.sqrt(np.einsum("rx,rx->r", towards, towards))
+                ways = towards / lengths[:, None]
+                inserted = along_field(slabs, ways, lengths, nodes, polarization.field(ways))
+                total[:, some] *= inserted.reshape(len(centres), -1, nodes.size)
+        return total
+
+
+def _own_faces(scene: RadioScene, name: str) -> int:
+    """Return the set of faces that no facet of an object is seen through: its own, if convex."""
+    if object_shape(scene.scenario, name) != "convex":
+        return 0
+    return sum(1 << face for face, owner in enumerate(scene.slabs.owners) if owner == name)
+
+
+def _nobody() -> None:
+    """Tell nobody."""
+
+
 def sightlines(scene: RadioScene, send: AntennaGroup, receive: AntennaGroup) -> Sightlines:
-    """Tell what links see of a scene's facets."""
+    """Tell what links see of a scene's facets, past what lets nothing through."""
     if scene.facets is None:
         raise ValueError("the scene has no facets; give a scene with a scattering object")
     known = list(scene.scenario.objects)
+    slabs = {known.index(name) for name in scene.slabs.owners}
     return Sightlines(
         rays=scene.rays,
         facets=scene.facets,
         senders=send.positions,
         receivers=receive.positions,
-        obstacles=scenario_obstacles(scene.scenario),
+        obstacles=[o for o in scenario_obstacles(scene.scenario) if o.owner not in slabs],
         shapes=[object_shape(scene.scenario, name) for name in scene.scattering],
         objects=[known.index(name) for name in scene.scattering],
     )

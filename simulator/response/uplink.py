@@ -4,25 +4,22 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex
 
 from scenes.scenario import User
 from simulator.antennas.beam_culling import AntennaGroup
-from simulator.antennas.field_pattern import field_gain
-from simulator.antennas.polarization import antenna_polarization
 from simulator.antennas.ports import Ports
 from simulator.geometry.ray_scene import blocked
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
+from simulator.response.direct_pilot import direct_pilot
+from simulator.response.over_one_surface import over_one_surface
 from simulator.response.single_bounce_3d import scattered_in_space
-from simulator.scattering.physical_optics import scattered
 from simulator.scene.array_antennas import array_group, in_space, user_group
 from simulator.scene.radio_scene import RadioScene, facet_ports
 from simulator.specular.diffuse_chains import diffuse_legs
-from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import trace_chain
 from simulator.specular.path_field import specular_response
-from simulator.visibility.line_of_sight import in_line_of_sight
 
 
 def simulate_uplink(
@@ -55,7 +52,7 @@ def simulate_uplink(
     -------
     S-parameter at each element (cylindrical waves: field). [-]
     """
-    pilot: np.ndarray = _direct(scene, user)
+    pilot: np.ndarray = direct_pilot(scene, user)
     if in_space(scene.scenario):
         name = next(name for name, one in scene.scenario.users.items() if one is user)
         sender, array_there = (
@@ -69,14 +66,7 @@ def simulate_uplink(
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])
-    over_walls: np.ndarray = scattered(
-        scene.facets,
-        port,
-        array,
-        scene.scenario.radio.frequencies,
-        waves=scene.scenario.waves,
-        advance=advance,
-    )
+    over_walls = over_one_surface(scene, scene.facets, port, array, advance=advance)
     both: np.ndarray = pilot + over_walls
     if not scene.facets.flat:
         return both
@@ -91,35 +81,6 @@ def simulate_uplink(
         progress=over_several,
     )
     return np.asarray(both + over_more)
-
-
-def _direct(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
-    scenario, station = scene.scenario, scene.scenario.base_station
-    elements = scene.elements
-    towards = elements - user.position
-    distances = np.linalg.norm(towards, axis=-1)
-    directions = towards / distances[:, None]
-    gains = field_gain(user.antenna, scenario.aim(user.antenna, user.position), directions)
-    gains = gains * field_gain(
-        station.antenna, scenario.aim(station.antenna, elements.mean(axis=0)), -directions
-    )
-    if scenario.dimensions == 3:
-        gains = gains * _polarization_match(scene, user, directions)
-    seen = in_line_of_sight(scene.rays, user.position, elements)
-    wave = direct_wave(distances, scenario.radio.frequencies, waves=scenario.waves)
-    return np.asarray(np.where(seen, gains, 0.0)[:, None] * wave)
-
-
-def _polarization_match(
-    scene: RadioScene, user: User, directions: Float[np.ndarray, "elements 3"]
-) -> Float[np.ndarray, " elements"]:
-    """Part of the user's field that the array receives. [-]."""
-    scenario, station = scene.scenario, scene.scenario.base_station
-    middle = scene.elements.mean(axis=0)
-    sent = antenna_polarization(user.antenna, scenario.aim(user.antenna, user.position))
-    received = antenna_polarization(station.antenna, scenario.aim(station.antenna, middle))
-    product = sent.field(directions) * received.field(-directions)
-    return np.asarray(product.sum(axis=-1))
 
 
 def _over_mirrors(
@@ -139,6 +100,7 @@ def _over_mirrors(
             array.positions,
             blocked=partial(blocked, scene.rays),
             clearance=scene.rays.clearance,
+            slabs=scene.slabs,
         )
         for leg in scene.mirrors.chains
         if 2 <= leg.bounces <= most
@@ -152,6 +114,7 @@ def _over_mirrors(
         receive=array.pattern.towards,
         sent=sender.pattern.polarization,
         received=array.pattern.polarization,
+        slabs=scene.slabs,
     )
     return np.asarray(response[0])
 

@@ -1,15 +1,16 @@
 """A scenario made ready to be simulated: frozen facets, the scene for rays, antenna ports."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
 from scenes.random_streams import random_stream
-from scenes.realisations.object_surface import object_surface
+from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.antenna import Antenna, Isotropic
 from scenes.schema.materials import Slab
@@ -20,6 +21,7 @@ from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import Facets, scene_facets
 from simulator.geometry.mean_surfaces import mean_surfaces
 from simulator.geometry.ray_scene import RayScene, build_scene, facets_visible
+from simulator.geometry.slabs import Slabs, no_slabs, sets_among
 from simulator.materials.facet_reflection import reflection_nodes
 from simulator.materials.fresnel_slab import Absorber, Dielectric, Material, named_material
 from simulator.materials.permittivity import (
@@ -28,9 +30,17 @@ from simulator.materials.permittivity import (
     Permittivity,
     read_permittivity,
 )
+from simulator.materials.slab_insertion import (
+    LEAST_LEVEL,
+    Crossing,
+    passage_level,
+    passage_nodes,
+    through_slabs,
+)
 from simulator.receiver.impairments import position_jitter
 from simulator.scene.array_antennas import array_group, in_space, needed_reach, sending_group
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors
+from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.diffuse_chains import diffuse_legs, may_reach
 from simulator.visibility.mutual_visibility import MutualVisibility
 
@@ -40,11 +50,20 @@ class RadioScene:
     """One realisation of a scenario: the same facets for every antenna and frequency."""
 
     scenario: Scenario
-    rays: RayScene
+    rays: RayScene  # among what lets nothing through
     facets: Facets | None  # None: nothing scatters
     elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
     scattering: tuple[str, ...] = ()  # names of the objects that the facets' materials belong to
     mirrors: SceneMirrors | None = None  # in space
+    slabs: Slabs = field(default_factory=no_slabs)  # what lets waves through
+    surfaces: tuple[Surface, ...] = ()  # of all objects
+
+    @cached_property
+    def rays_to_all(self) -> RayScene:
+        """Among all surfaces, those that let waves through, too."""
+        if not len(self.slabs):
+            return self.rays
+        return build_scene(self.surfaces, mean=True)
 
     def facets_of(self, name: str) -> Facets:
         """Return the facets of one object."""
@@ -56,7 +75,9 @@ class RadioScene:
     def mutual_visibility(self) -> MutualVisibility:
         """Which facets see each other: the same for all antennas, in echo and uplinks."""
         faces = () if self.facets is None else scattering_faces(self.facets)
-        return MutualVisibility(self.rays, faces)
+        frequencies = self.scenario.radio.frequencies
+        band = float(frequencies[0]), float(frequencies[-1])
+        return MutualVisibility(self.rays, faces, slabs=self.slabs, band=band)
 
 
 def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
@@ -69,9 +90,17 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
     """
     materials = scenario_materials(scenario)  # first: it is quick, and may fail
     elements = true_elements(scenario, seed=seed, sample=sample)
+    slabs = scene_slabs(scenario, materials)
     if scenario.max_bounces == 0:  # surfaces only block rays
-        rays = build_scene(mean_surfaces(scenario))
-        return RadioScene(scenario=scenario, rays=rays, facets=None, elements=elements)
+        plain = tuple(mean_surfaces(scenario))
+        return RadioScene(
+            scenario=scenario,
+            rays=build_scene(opaque(plain, slabs)),
+            facets=None,
+            elements=elements,
+            slabs=slabs,
+            surfaces=plain,
+        )
     mirrors = _mirrors(scenario, materials, elements) if in_space(scenario) else None
     surfaces, scattering = [], {}
     for name, material in materials.items():
@@ -93,7 +122,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
     return RadioScene(
         scenario=scenario,
         # Roughness is the weights' business, and hides nothing.
-        rays=build_scene(surfaces, mean=True),
+        rays=build_scene(opaque(surfaces, slabs), mean=True),
         facets=(
             scene_facets(
                 list(scattering.values()),
@@ -106,7 +135,14 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
         elements=elements,
         scattering=tuple(scattering),
         mirrors=mirrors,
+        slabs=slabs,
+        surfaces=tuple(surfaces),
     )
+
+
+def opaque(surfaces: Sequence[Surface], slabs: Slabs) -> list[Surface]:
+    """Choose the surfaces that let nothing through."""
+    return [surface for surface in surfaces if surface.name not in slabs.owners]
 
 
 def middle_wavelength(scenario: Scenario) -> float:
@@ -195,9 +231,62 @@ def antenna_pattern(antenna: Antenna, aim: Float[np.ndarray, " 3"]) -> Pattern:
 def facet_ports(
     scene: RadioScene, facets: Facets, antenna: Antenna, positions: Float[np.ndarray, "ports 3"]
 ) -> Ports:
-    """Place equal antennas at positions and trace which facets each sees."""
-    return Ports(
+    """Place equal antennas at positions; find which facets each sees, and through what."""
+    ports = Ports(
         positions=positions,
         pattern=antenna_pattern(antenna, scene.scenario.aim(antenna, positions.mean(axis=0))),
         visible=facets_visible(scene.rays, facets, positions),
     )
+    if not len(scene.slabs):
+        return ports
+    off = scene.rays.clearance
+    crossed = scene.slabs.crossed_between(positions, facets.places, off=off)
+    behind = [
+        _through(scene, ports, scene.slabs.crossings(one), crossed == one)
+        for one in sets_among(crossed, ports.visible)
+    ]
+    return replace(
+        ports,
+        visible=ports.visible & (crossed == 0),
+        behind_slabs=tuple(one for one in behind if one is not None),
+    )
+
+
+def _through(
+    scene: RadioScene,
+    ports: Ports,
+    crossings: tuple[Crossing, ...],
+    behind: Bool[np.ndarray, "ports facets"],
+) -> Ports | None:
+    """Look at what is behind a set of slabs; None if they let too little through."""
+    scenario = scene.scenario
+    frequencies = scenario.radio.frequencies
+    if passage_level(crossings, frequencies) < LEAST_LEVEL:
+        return None
+    return replace(
+        ports,
+        visible=ports.visible & behind,
+        pattern=partial(_inserted, ports.pattern, crossings, scenario),
+        nodes=ports.nodes
+        + passage_nodes(crossings, float(frequencies[0]), float(frequencies[-1]))
+        - 1,
+    )
+
+
+def _inserted(
+    pattern: Pattern,
+    crossings: tuple[Crossing, ...],
+    scenario: Scenario,
+    directions: Float[np.ndarray, "facets 3"],
+    distances: Float[np.ndarray, " facets"],
+    frequencies: Float[np.ndarray, " nodes"],
+) -> Complex[np.ndarray, "nodes facets"]:
+    inserted = through_slabs(
+        crossings,
+        directions,
+        distances,
+        frequencies,
+        vertical=scenario.radio.polarization == "vertical",
+        cylindrical=scenario.waves == "cylindrical",
+    )
+    return np.asarray(pattern(directions, distances, frequencies) * inserted.T)

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from simulator.geometry.mirrors import Mirrors, dot
 from simulator.geometry.ray_scene import CLEARANCE
+from simulator.geometry.slabs import Slabs
 
 ROUGHNESS_CLEARANCE = 6.0
 """How much farther off a rough mirror a segment starts, over its rms height: no crest is higher
@@ -43,6 +44,7 @@ class Chain:
     vertices: Float[np.ndarray, "paths bounces 3"]  # where the mirrors are hit [m]
     cosines: Float[np.ndarray, "paths bounces"]  # of the angles of incidence [-]
     directions: Float[np.ndarray, "paths legs 3"]  # unit vectors of travel, bounces + 1 legs
+    crossed: Int[np.ndarray, "paths legs"] | None = None  # sets of slabs on each leg; None: none
 
     @property
     def departures(self) -> Float[np.ndarray, "paths 3"]:
@@ -67,6 +69,7 @@ def find_chains(
     min_bounces: int = 0,
     receivers_on: int | None = None,
     receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
+    slabs: Slabs | None = None,
 ) -> tuple[Chain, ...]:
     """Find all specular paths of up to ``max_bounces`` bounces.
 
@@ -86,6 +89,8 @@ def find_chains(
         Mirror that the receivers lie on (facets of its rough surface): no chain ends with it.
     receiver_offsets
         Moves the receivers, for the occlusion test only, off the surface they lie on. [m]
+    slabs
+        What lets waves through, of which the chains tell what they cross.
 
     Returns
     -------
@@ -97,7 +102,9 @@ def find_chains(
         last_is_own = bool(sequence) and sequence[-1] == receivers_on
         if len(sequence) < min_bounces or last_is_own:
             continue
-        chain = _trace(mirrors, sequence, images, sources, receivers, ends, blocked, clearance)
+        chain = _trace(
+            mirrors, sequence, images, sources, receivers, ends, blocked, clearance, slabs=slabs
+        )
         if chain.lengths.size:
             found.append(chain)
     return tuple(sorted(found, key=lambda chain: (len(chain.mirrors), chain.mirrors)))
@@ -113,12 +120,13 @@ def trace_chain(
     clearance: float = CLEARANCE,
     receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
     paired: bool = False,
+    slabs: Slabs | None = None,
 ) -> Chain:
     """Find the specular paths over one given sequence of mirrors; see :func:`find_chains`.
 
     Parameters
     ----------
-    mirrors, sources, receivers, blocked, clearance, receiver_offsets
+    mirrors, sources, receivers, blocked, clearance, receiver_offsets, slabs
         See :func:`find_chains`.
     sequence
         The mirrors, from the source onward.
@@ -131,7 +139,16 @@ def trace_chain(
         images[bounce] = latest = mirrors.images(latest, mirror)
     ends = receivers if receiver_offsets is None else receivers + receiver_offsets
     return _trace(
-        mirrors, sequence, images, sources, receivers, ends, blocked, clearance, paired=paired
+        mirrors,
+        sequence,
+        images,
+        sources,
+        receivers,
+        ends,
+        blocked,
+        clearance,
+        paired=paired,
+        slabs=slabs,
     )
 
 
@@ -244,17 +261,23 @@ def _trace(
     clearance: float,
     *,
     paired: bool = False,
+    slabs: Slabs | None = None,
 ) -> Chain:
     pairs = np.zeros(len(sources) * (1 if paired else len(receivers)), dtype=bool)
     parts = [np.empty((0, len(sequence), 3))]
+    sets = [np.empty((0, len(sequence) + 1), dtype=np.int64)]
     for first in range(0, pairs.size, PAIRS_AT_ONCE):
         some = np.arange(first, min(first + PAIRS_AT_ONCE, pairs.size))
         source, receiver = (some, some) if paired else np.divmod(some, len(receivers))
         kept, vertices = _unfold(mirrors, sequence, images, sources, receivers, source, receiver)
         source, receiver = source[kept], receiver[kept]
         points = [sources[source], *np.moveaxis(vertices, 1, 0), ends[receiver]]
-        clear = _clear(mirrors, sequence, points, blocked, clearance)
+        lifted = _lifted(mirrors, sequence, points, clearance)
+        clear = _clear(lifted, blocked)
         pairs[some[kept[clear]]] = True
+        if slabs is not None and len(slabs):
+            legs = [slabs.crossed(a[clear], b[clear]) for a, b in pairwise(lifted)]
+            sets.append(np.stack(legs, axis=-1))
         parts.append(vertices[clear])
     valid = np.diag(pairs) if paired else pairs.reshape(len(sources), len(receivers))
     source, receiver = np.nonzero(valid)
@@ -269,6 +292,7 @@ def _trace(
         vertices=np.concatenate(parts),
         cosines=cosines,
         directions=directions,
+        crossed=np.concatenate(sets) if slabs is not None and len(slabs) else None,
     )
 
 
@@ -308,21 +332,27 @@ def _unfold(
     return kept, vertices
 
 
-def _clear(
+def _lifted(
     mirrors: Mirrors,
     sequence: tuple[int, ...],
     points: list[Float[np.ndarray, "paths 3"]],
-    blocked: Blocked,
     clearance: float,
-) -> Int[np.ndarray, " clear"]:
-    """Tell which paths meet nothing between their points."""
+) -> list[Float[np.ndarray, "paths 3"]]:
+    """Lift the vertices of paths off their mirrors."""
     lifted = [points[0]]
     for mirror, before, here in zip(sequence, points[:-1], points[1:], strict=False):
         side = np.sign(mirrors.heights(before, mirror))
         lift = clearance + ROUGHNESS_CLEARANCE * mirrors.rms_heights[mirror]
         lifted.append(here + lift * side[:, None] * mirrors.normals[mirror])
     lifted.append(points[-1])
-    clear = np.arange(len(points[0]))
+    return lifted
+
+
+def _clear(
+    lifted: list[Float[np.ndarray, "paths 3"]], blocked: Blocked
+) -> Int[np.ndarray, " clear"]:
+    """Tell which paths meet nothing between their points."""
+    clear = np.arange(len(lifted[0]))
     for start, end in pairwise(lifted):
         if clear.size:
             clear = clear[~blocked(start[clear], end[clear])]

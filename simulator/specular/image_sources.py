@@ -18,7 +18,7 @@ from simulator.antennas.beam_culling import LEVEL, AntennaGroup
 from simulator.antennas.links import Links
 from simulator.geometry.mirrors import Mirrors
 from simulator.specular.image_method import unfolded_chain
-from simulator.specular.path_field import reflected_field
+from simulator.specular.path_field import Through, reflected_field
 
 MOST_LEGS = 10_000
 """Most legs over mirrors: each is traced from every antenna, some 10 ms; minutes in all. [-]"""
@@ -138,6 +138,7 @@ class LegReflection:
     mirrors: Mirrors
     out: Leg
     back: Leg
+    through: tuple[Through, Through] = ((), ())  # slabs on each part of either leg
 
     def __call__(
         self,
@@ -147,16 +148,21 @@ class LegReflection:
     ) -> Complex[np.ndarray, "patches links nodes"]:
         """Work it out for links between images."""
         total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
-        for leg, places, image in (
-            (self.out, links.senders, links.sent.polarization),
-            (self.back, links.receivers, links.received.polarization),
+        for leg, places, image, through in (
+            (self.out, links.senders, links.sent.polarization, self.through[0]),
+            (self.back, links.receivers, links.received.polarization, self.through[1]),
         ):
             at_once = max(1, PAIRS_AT_ONCE // len(centres))
-            for first in range(0, len(places) if leg.sequence else 0, at_once):
+            for first in range(0, len(places) if leg.sequence or any(through) else 0, at_once):
                 some = slice(first, first + at_once)
                 chain = unfolded_chain(self.mirrors, leg.sequence, places[some], centres)
                 field = reflected_field(
-                    self.mirrors, chain, nodes, sent=image.turned(leg.turn.T), at_place=image
+                    self.mirrors,
+                    chain,
+                    nodes,
+                    sent=image.turned(leg.turn.T),
+                    at_place=image,
+                    through=through,
                 )
                 total[:, some] *= np.moveaxis(
                     field.reshape(len(places[some]), len(centres), -1), 0, 1

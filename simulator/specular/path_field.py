@@ -9,16 +9,18 @@ with the reflection dyads :math:`\mathsf R_i` of the mirrors (TE and TM coeffici
 at that angle and frequency) and the field's unit vectors :math:`\hat e` at both antennas.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Waves
 from simulator.antennas.polarization import VERTICAL, Polarization
 from simulator.geometry.mirrors import Mirrors, dot
+from simulator.geometry.slabs import Slabs
 from simulator.materials import fresnel_slab
+from simulator.materials.slab_insertion import Crossing, transported_through
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import Chain
 
@@ -28,6 +30,9 @@ SAMPLES_AT_ONCE = 1_000_000
 PARALLEL = 1e-9
 """Angle below which two directions are one: what is left across them is rounding (1e-16 of either,
 a ten-millionth of this). [rad]"""
+
+Through = tuple[tuple[Crossing, ...], ...]
+"""The slabs on each leg of a path; empty: none on any."""
 
 Gain = Callable[[Float[np.ndarray, "paths 3"]], Float[np.ndarray, " paths"]]
 """Field pattern of an antenna over unit directions outward from it."""
@@ -46,6 +51,7 @@ def reflected_field(
     sent: Polarization = VERTICAL,
     received: Polarization = VERTICAL,
     at_place: Polarization | None = None,
+    through: Through = (),
 ) -> Complex[np.ndarray, "paths freqs"]:
     """Field received over the field sent, spreading and delay apart.
 
@@ -63,30 +69,36 @@ def reflected_field(
     at_place
         In place of a receiver: the field of the antenna's image over the chain, of which the
         part at the path's end is asked for.
+    through
+        The slabs on each leg, the same for all paths; without, none are.
     """
     everything = slice(0, len(chain.lengths))
     if at_place is None:
-        return _field(mirrors, chain, everything, frequencies, (sent, received))
+        return _field(mirrors, chain, everything, frequencies, (sent, received), through)
     # The image's ray goes on as the path ends.
     image = Polarization(axis=at_place.axis, cross_polar=-at_place.cross_polar)
-    return _field(mirrors, chain, everything, frequencies, (sent, image))
+    return _field(mirrors, chain, everything, frequencies, (sent, image), through)
 
 
 def _field(
     mirrors: Mirrors,
     chain: Chain,
-    some: slice,
+    some: slice | Int[np.ndarray, " some"],
     frequencies: Float[np.ndarray, " freqs"],
     ends: tuple[Polarization, Polarization],
+    through: Through = (),
 ) -> Complex[np.ndarray, "paths freqs"]:
     directions = chain.directions[some]
     sent, received = ends[0].field(directions[:, 0]), ends[1].field(-directions[:, -1])
-    if not chain.mirrors:
+    if not chain.mirrors and not any(through):
         link = dot(sent, received)[:, None] + 0j
         return np.repeat(link, frequencies.size, axis=1)
     wavenumbers = 2.0 * np.pi * frequencies / speed_of_light
     # Two components across the ray; their unit vectors before and after each mirror.
     vectors, field = [sent, sent], [np.ones((len(sent), 1)), np.zeros((len(sent), 1))]
+    legs = through or ((),) * (len(chain.mirrors) + 1)
+    lengths = chain.lengths[some]
+    field, vectors = _past(legs[0], directions[:, 0], lengths, frequencies, field, vectors)
     for bounce, mirror in enumerate(chain.mirrors):
         inward, outward = directions[:, bounce], directions[:, bounce + 1]
         across = _across(inward, mirrors.normals[mirror])
@@ -97,7 +109,28 @@ def _field(
         loss = roughness_loss(wavenumbers * mirrors.rms_heights[mirror] * cosines[:, None])
         field = [te * coefficients.te * loss, tm * coefficients.tm * loss]
         vectors = [across, np.cross(outward, across)]
+        field, vectors = _past(legs[bounce + 1], outward, lengths, frequencies, field, vectors)
     return _project(field, vectors, received)
+
+
+def _past(
+    crossings: Sequence[Crossing],
+    directions: Float[np.ndarray, "paths 3"],
+    lengths: Float[np.ndarray, " paths"],
+    frequencies: Float[np.ndarray, " freqs"],
+    field: list[np.ndarray],
+    vectors: list[np.ndarray],
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Take a field, given by two components, through the slabs on a leg."""
+    if not crossings:
+        return field, vectors
+    whole = field[0][..., None] * vectors[0][:, None] + field[1][..., None] * vectors[1][:, None]
+    whole = np.broadcast_to(whole, (len(directions), frequencies.size, 3)).astype(np.complex128)
+    arrived = transported_through(crossings, directions, lengths, frequencies, whole)
+    across = _across(directions, crossings[-1].normal)
+    within = np.cross(directions, across)
+    parts = [np.einsum("pfx,px->pf", arrived, axis) for axis in (across, within)]
+    return parts, [across, within]
 
 
 def roughness_loss(phase: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
@@ -120,6 +153,7 @@ def specular_response(
     sent: Polarization = VERTICAL,
     received: Polarization = VERTICAL,
     waves: Waves = "spherical",
+    slabs: Slabs | None = None,
 ) -> Complex[np.ndarray, "sources receivers freqs"]:
     """Sum the specular paths of each link.
 
@@ -137,6 +171,8 @@ def specular_response(
         Polarizations of the sources and of the receivers.
     waves
         Spherical (S-parameters), or cylindrical (fields of unit line sources).
+    slabs
+        What the chains cross sets of.
 
     Returns
     -------
@@ -147,12 +183,26 @@ def specular_response(
     for chain in chains:
         gains = transmit(chain.departures) * receive(chain.arrivals)
         source, receiver = np.nonzero(chain.valid)
-        for first in range(0, len(gains), paths_at_once):
-            some = slice(first, first + paths_at_once)
-            field = _field(mirrors, chain, some, frequencies, (sent, received))
-            field *= gains[some, None] * direct_wave(chain.lengths[some], frequencies, waves=waves)
-            response[source[some], receiver[some]] += field  # no link twice: one path a chain
+        for alike, through in _by_slabs(chain, slabs):
+            for first in range(0, len(alike), paths_at_once):
+                some = alike[first : first + paths_at_once]
+                field = _field(mirrors, chain, some, frequencies, (sent, received), through)
+                wave = direct_wave(chain.lengths[some], frequencies, waves=waves)
+                field *= gains[some, None] * wave
+                response[source[some], receiver[some]] += field  # no link twice: one path a chain
     return response
+
+
+def _by_slabs(
+    chain: Chain, slabs: Slabs | None
+) -> Iterator[tuple[Int[np.ndarray, " paths"], Through]]:
+    """Sort a chain's paths by the slabs on each of their legs."""
+    if slabs is None or chain.crossed is None:
+        yield np.arange(len(chain.lengths)), ()
+        return
+    kinds, kind = np.unique(chain.crossed, axis=0, return_inverse=True)
+    for index, sets in enumerate(kinds.tolist()):
+        yield np.flatnonzero(kind.ravel() == index), tuple(slabs.crossings(one) for one in sets)
 
 
 def _across(

@@ -2,16 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from scenes.schema.errors import ScenarioError
 from simulator.geometry.faces import Face
 from simulator.geometry.ray_scene import RAYS_AT_ONCE, RayScene, blocked
+from simulator.geometry.slabs import Slabs, no_slabs, sets_among
+from simulator.materials.slab_insertion import LEAST_LEVEL, Crossing, passage_level
 
 MOST_PAIRS = 2**30
 """Most pairs of facets of two surfaces: 1 GiB. [-]"""
+
+
+class Sight(NamedTuple):
+    """Facets of two faces that see each other alike."""
+
+    crossings: tuple[Crossing, ...]  # the slabs between them
+    seen: Bool[np.ndarray, "one other"]
 
 
 @dataclass(frozen=True)
@@ -20,18 +30,56 @@ class MutualVisibility:
 
     rays: RayScene
     faces: Sequence[Face]  # whole
+    slabs: Slabs = field(default_factory=no_slabs)
+    band: tuple[float, float] = (0.0, 0.0)  # that slabs have to let through [Hz]
     _traced: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+    _sets: list[int] = field(default_factory=lambda: [0])  # of slabs, as they are met
 
     def __call__(self, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
         """Look up some facets of two faces; points within a facet see what its centre sees."""
+        return np.asarray(self._look_up(one, other) == 0)
+
+    def sights(self, one: Face, other: Face) -> tuple[Sight, ...]:
+        """Tell which facets see each other past everything, and through which slabs.
+
+        What lets less than :data:`simulator.materials.slab_insertion.LEAST_LEVEL` through is left
+        out; so are sights that no two facets have.
+        """
+        through = self._look_up(one, other)
+        found = []
+        for number in np.unique(through[through >= 0]).tolist():
+            crossings = self.slabs.crossings(self._sets[number])
+            if passage_level(crossings, np.linspace(*self.band, 33)) >= LEAST_LEVEL:
+                found.append(Sight(crossings, np.asarray(through == number)))
+        return tuple(found)
+
+    def _look_up(self, one: Face, other: Face) -> Int[np.ndarray, "one other"]:
+        """Return the number of the set of slabs between two facets; -1: they are hidden."""
         (first, rows), (second, columns) = self._whole(one), self._whole(other)
         if (second, first) in self._traced:
             return np.asarray(self._traced[second, first].T[np.ix_(rows, columns)])
         if (first, second) not in self._traced:
-            self._traced[first, second] = facets_see_each_other(
-                self.rays, self.faces[first], self.faces[second]
-            )
+            self._traced[first, second] = self._trace(self.faces[first], self.faces[second])
         return np.asarray(self._traced[first, second][np.ix_(rows, columns)])
+
+    def _trace(self, one: Face, other: Face) -> Int[np.ndarray, "one other"]:
+        seen = facets_see_each_other(self.rays, one, other)
+        numbers = np.where(seen, np.int8(0), np.int8(-1))
+        if not len(self.slabs):
+            return numbers
+        rows = max(1, RAYS_AT_ONCE // max(other.count, 1))
+        for first in range(0, one.count, rows):
+            block = slice(first, first + rows)
+            crossed = self.slabs.crossed_between(
+                _in_space(one.places[block]), _in_space(other.places), off=self.rays.clearance
+            )
+            for slabs in sets_among(crossed, seen[block]):
+                if slabs not in self._sets:
+                    self._sets.append(slabs)
+                number = self._sets.index(slabs)
+                numbers = numbers.astype(np.int16, copy=False)
+                numbers[block][seen[block] & (crossed == slabs)] = number
+        return numbers
 
     def _whole(self, part: Face) -> tuple[int, np.ndarray]:
         """Which face it is a part of, and which facets of that face it has."""

@@ -1,0 +1,63 @@
+"""What the facets of a scene scatter of waves that come past everything, or through slabs."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Complex
+
+from simulator.antennas.ports import Ports
+from simulator.geometry.facets import Facets
+from simulator.scattering.physical_optics import scattered
+from simulator.scene.radio_scene import RadioScene
+
+
+def over_one_surface(
+    scene: RadioScene,
+    facets: Facets,
+    transmit: Ports,
+    receive: Ports,
+    *,
+    advance: Callable[[], None],
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum the facets' echoes for each link, over all ways there and back.
+
+    Parameters
+    ----------
+    scene
+        The frozen scene.
+    facets
+        Its facets.
+    transmit, receive
+        As for :func:`simulator.scattering.physical_optics.scattered`.
+    advance
+        Called for each link.
+
+    Returns
+    -------
+    S-parameter of each link; with cylindrical waves, field per unit line source. [-]
+    """
+    scenario = scene.scenario
+    out = transmit.ways
+    back = out if receive is transmit else receive.ways
+    total: np.ndarray | None = None
+    for there in out:
+        for here in back:
+            # An antenna sees each facet over one way only.
+            if receive is transmit and here is not there:
+                continue
+            if total is not None and not (there.visible & here.visible).any():
+                continue
+            part = scattered(
+                facets,
+                there,
+                here,
+                scenario.radio.frequencies,
+                waves=scenario.waves,
+                advance=advance if total is None else _nobody,
+            )
+            total = part if total is None else total + part
+    return np.asarray(total)
+
+
+def _nobody() -> None:
+    """Tell nobody."""
