@@ -175,7 +175,7 @@ def _put_paths(row: Row, layout: Layout, scenario: Scenario) -> None:
         user, number = layout.users.index(path.end), counts.get(path.end, 0)
         counts[path.end] = number + 1
         row[f"{TRUTH}/path_count"][user] = number + 1
-        if path.bounces == 0:
+        if path.bounces == 0 and not path.through:
             row[f"{TRUTH}/line_of_sight"][user] = 1
         if number >= row[f"{TRUTH}/path_angle"].shape[1]:
             continue
@@ -187,6 +187,8 @@ def _put_paths(row: Row, layout: Layout, scenario: Scenario) -> None:
             "path_delay": path.length / speed_of_light,
             "path_bounces": path.bounces,
             "path_antenna_gain": path.gain_db,
+            "path_slabs": len(path.through),
+            "path_transmission": path.transmission_db,
         }
         for name, value in values.items():
             row[f"{TRUTH}/{name}"][user, number] = value

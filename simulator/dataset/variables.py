@@ -237,6 +237,14 @@ def label_variables(users: int, walls: int, targets: int, paths: int) -> list[Va
                 "f8",
                 {"units": "dB", "long_name": "of both antennas, relative to their peaks"},
             ),
+            of_paths(
+                "path_slabs", "i2", {"units": "1", "long_name": "slabs that it leads through"}
+            ),
+            of_paths(
+                "path_transmission",
+                "f8",
+                {"units": "dB", "long_name": "field behind these slabs over that before"},
+            ),
         ]
     if walls:
         found += [

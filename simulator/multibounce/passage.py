@@ -131,7 +131,7 @@ def passages_over(
             )
         ]
     for walls, sights in yet:
-        latest, bounds = direct(walls[0], ports, np.ones(1)).bounds, []
+        latest, bounds = direct(walls[0], ports, frequencies[:1]).bounds, []
         for wall, onto, sight in zip(walls, [*walls[1:], target], sights, strict=True):
             latest = onward_bounds(latest, wall, onto, sight.seen)
             bounds.append(latest)

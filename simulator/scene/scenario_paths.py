@@ -1,9 +1,10 @@
 """The specular paths of a scenario: from the array to each user, and to each hidden target."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -13,15 +14,22 @@ from scenes.scenario import Scenario
 from scenes.schema.antenna import Antenna
 from scenes.schema.objects import Plate
 from simulator.antennas.field_pattern import field_gain
+from simulator.antennas.polarization import VERTICAL
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.ray_scene import RayScene, blocked, build_scene
+from simulator.geometry.slabs import Slabs
 from simulator.materials.fresnel_slab import Absorber
-from simulator.scene.radio_scene import scenario_materials
+from simulator.materials.slab_insertion import LEAST_LEVEL, along_field, through_slabs
+from simulator.scene.radio_scene import opaque, scenario_materials
+from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.image_method import Chain, find_chains
 
 PLACES = 17
 """Places on each line of a target from which paths to the array are sought."""
+
+FAINTEST_DB = 20 * math.log10(LEAST_LEVEL)
+"""Transmission below which a path is not listed: it is not simulated either. [dB]"""
 
 MOST_PER_TARGET = 3
 """Chains of mirrors shown for one target, the shortest ones."""
@@ -35,6 +43,8 @@ class ScenarioPath:
     kind: Literal["user", "object", "receiver"]
     vertices: Float[np.ndarray, "vertices 3"]  # from the array onward [m]
     gain_db: float  # of both antennas in its direction, relative to their peaks [dB]
+    through: tuple[str, ...] = ()  # objects that it leads through, as often as it meets a slab
+    transmission_db: float = 0.0  # what these let through in the middle of the band [dB]
 
     @property
     def bounces(self) -> int:
@@ -68,20 +78,38 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     """
     surfaces = mean_surfaces(scenario)
     materials = scenario_materials(scenario)
-    rays = build_scene(surfaces)
     mirrors = mean_mirrors(scenario, surfaces, materials)
     if scenario.base_station.multistatic:
-        return tuple(_to_receivers(scenario, mirrors, rays))
-    found = [*_to_users(scenario, mirrors, rays)]
+        return tuple(_to_receivers(scenario, mirrors, build_scene(surfaces)))
+    slabs = scene_slabs(scenario, materials)
+    room = _Room(mirrors, build_scene(opaque(surfaces, slabs)), slabs)
+    found = [*_to_users(scenario, room)]
     for surface in surfaces:
         body = scenario.objects[surface.name]
         if not isinstance(body, Plate) and not isinstance(materials[surface.name], Absorber):
-            found += _to_object(scenario, surface, mirrors, rays)
+            found += _to_object(scenario, surface, room)
     return tuple(found)
 
 
-def _to_users(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[ScenarioPath]:
-    centre = _centre(scenario)
+class _Room(NamedTuple):
+    """What reflects, what blocks, and what lets through."""
+
+    mirrors: Mirrors
+    rays: RayScene
+    slabs: Slabs
+
+    def through(self, chain: Chain, path: int) -> tuple[int, ...]:
+        """Return the set of slabs on each leg of a chain's path."""
+        return () if chain.crossed is None else tuple(chain.crossed[path].tolist())
+
+    def owners(self, sets: Sequence[int]) -> tuple[str, ...]:
+        """Name the objects of sets of slabs."""
+        faces = [face for one in sets for face in range(len(self.slabs)) if one >> face & 1]
+        return tuple(self.slabs.owners[face] for face in faces)
+
+
+def _to_users(scenario: Scenario, room: _Room) -> Iterator[ScenarioPath]:
+    centre, (mirrors, rays, slabs) = _centre(scenario), room
     for name, user in scenario.users.items():
         chains = find_chains(
             mirrors,
@@ -90,8 +118,15 @@ def _to_users(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[
             blocked=partial(blocked, rays),
             clearance=rays.clearance,
             max_bounces=scenario.max_bounces,
+            slabs=slabs,
         )
         for chain in chains:
+            if not chain.mirrors and not scenario.effects.line_of_sight:
+                continue
+            sets = room.through(chain, 0)
+            loss = _transmission_db(scenario, room, chain, sets)
+            if loss < FAINTEST_DB:
+                continue
             gain = _gain_db(scenario, scenario.base_station.antenna, centre, chain.departures[0])
             gain += _gain_db(scenario, user.antenna, user.position, chain.arrivals[0])
             yield ScenarioPath(
@@ -99,7 +134,29 @@ def _to_users(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[
                 kind="user",
                 vertices=np.stack([centre, *chain.vertices[0], user.position]),
                 gain_db=gain,
+                through=room.owners(sets),
+                transmission_db=loss,
             )
+
+
+def _transmission_db(scenario: Scenario, room: _Room, chain: Chain, sets: tuple[int, ...]) -> float:
+    """Level of a vertical field behind the slabs on a chain's first path, over that before [dB]."""
+    middle, loss = np.array([scenario.radio.centre_frequency]), 0.0
+    vertical = scenario.dimensions == 3 or scenario.radio.polarization == "vertical"
+    for leg, one in enumerate(sets):
+        crossings = room.slabs.crossings(one)
+        if not crossings:
+            continue
+        way, length = chain.directions[:1, leg], chain.lengths[:1]
+        if scenario.dimensions == 3:
+            field = VERTICAL.field(way)
+            left = along_field(crossings, way, length, middle, field)
+        else:
+            left = through_slabs(
+                crossings, way, length, middle, vertical=vertical, cylindrical=True
+            )
+        loss += float(20 * np.log10(max(abs(left[0, 0]), 1e-15)))
+    return loss
 
 
 def _to_receivers(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Iterator[ScenarioPath]:
@@ -135,10 +192,8 @@ def _to_receivers(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Itera
         )
 
 
-def _to_object(
-    scenario: Scenario, surface: Surface, mirrors: Mirrors, rays: RayScene
-) -> list[ScenarioPath]:
-    centre = _centre(scenario)
+def _to_object(scenario: Scenario, surface: Surface, room: _Room) -> list[ScenarioPath]:
+    centre, (mirrors, rays, slabs) = _centre(scenario), room
     places, outward = _places(surface)
     if scenario.max_bounces == 0:
         return []
@@ -150,6 +205,7 @@ def _to_object(
         clearance=rays.clearance,
         max_bounces=scenario.max_bounces - 1,
         receiver_offsets=rays.clearance * outward,
+        slabs=slabs,
     )
     # The body is a surface, too, and the echo returns over at least the fewest mirrors.
     lit = [chain for chain in chains if _lit(chain, outward).any()]
@@ -164,7 +220,13 @@ def _to_object(
             vertices = np.stack([centre, *chain.vertices[best], place])
             gain = _gain_db(scenario, scenario.base_station.antenna, centre, chain.departures[best])
             shortest.append(
-                ScenarioPath(end=surface.name, kind="object", vertices=vertices, gain_db=gain)
+                ScenarioPath(
+                    end=surface.name,
+                    kind="object",
+                    vertices=vertices,
+                    gain_db=gain,
+                    through=room.owners(room.through(chain, best)),
+                )
             )
     shortest.sort(key=lambda path: path.length)
     return sorted(shortest[:MOST_PER_TARGET], key=lambda path: (path.bounces, path.length))
