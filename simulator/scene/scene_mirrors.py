@@ -65,11 +65,12 @@ def scene_mirrors(
         owners=tuple(name for name, part in parts.items() for _ in range(len(part))),
         legs=tuple(leg for leg in chains if leg.bounces < scenario.max_bounces),
         chains=chains,
-        targets=tuple(n for n in scenario.objects if _size(scenario, n) <= LARGEST_TARGET),
+        targets=tuple(n for n in scenario.objects if longest_side(scenario, n) <= LARGEST_TARGET),
     )
 
 
-def _size(scenario: Scenario, name: str) -> float:
+def longest_side(scenario: Scenario, name: str) -> float:
+    """Return the longest side of a body [m]; a plate is none."""
     body = scenario.objects[name]
     match body:
         case Plate():

@@ -9,12 +9,14 @@ from validation.claims import (
     random_rooms,
     scenarios,
     thesis,
+    transmission,
 )
 from validation.harness.claim import Claim
 
 ALL_CLAIMS: tuple[Claim, ...] = (
     *closed_forms.CLAIMS,
     *propagation.CLAIMS,
+    *transmission.CLAIMS,
     *imaging.CLAIMS,
     *full_wave.CLAIMS,
     *thesis.CLAIMS,

@@ -9,7 +9,6 @@ array's own link to the cylinders is left out of the reference.
 """
 
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,7 @@ from simulator.geometry.faces import scattering_faces
 from simulator.geometry.facets import joined, profile_surface, surface_facets
 from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.multibounce.multibounce_2d import ghost_echo
-from simulator.visibility.mutual_visibility import facets_see_each_other
+from simulator.visibility.mutual_visibility import MutualVisibility
 from validation.full_wave.wall_comparison import read_reference
 
 LEAST_CORRELATION = 0.97
@@ -52,9 +51,10 @@ def cylinders_echo(
     scene = build_scene(surfaces, mean=True)
     visible = facets_visible(scene, facets, positions)
     visible[:, len(surfaces[0].cells) :] = False  # no direct link
+    faces = scattering_faces(facets)
     return ghost_echo(
-        scattering_faces(facets),
-        partial(facets_see_each_other, scene),
+        faces,
+        MutualVisibility(scene, faces),
         Ports(positions=positions, pattern=isotropic, visible=visible),
         two["frequency"],
         waves="cylindrical",

@@ -46,8 +46,9 @@ def airy(angle: float, thickness: float, frequencies: np.ndarray) -> np.ndarray:
     wavenumber = 2 * np.pi * frequencies / speed_of_light
     once = np.exp(-1j * wavenumber * thickness * inner)
     echoes = sum((face * once) ** (2 * number) for number in range(60))
-    through: np.ndarray = (1 - face**2) * once * echoes
-    return through * np.exp(1j * wavenumber * thickness * np.cos(angle))
+    through = (1 - face**2) * once * echoes
+    over_air: np.ndarray = through * np.exp(1j * wavenumber * thickness * np.cos(angle))
+    return over_air
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])

@@ -46,14 +46,14 @@ def join(parts: list[tuple[np.ndarray, Material, float]]) -> Mirrors:
     )
 
 
-def along(axis: Any) -> dict[str, Polarization]:
+def along(axis: Any) -> dict[str, Any]:
     """Both antennas polarized along one axis."""
     both = Polarization(axis=np.array(axis))
     return {"sent": both, "received": both}
 
 
 def reflected(
-    mirrors: Mirrors, source: list[float], receiver: list[float], **options: Polarization
+    mirrors: Mirrors, source: list[float], receiver: list[float], **options: Any
 ) -> np.ndarray:
     """The field over the single path of one bounce, over frequency."""
     ends = np.array([source]), np.array([receiver])

@@ -1,0 +1,173 @@
+"""Our paths through slabs beside Sionna RT's with refraction, on random scenes in space.
+
+Both know thin plates at whose place a slab's coefficient multiplies; theirs leave the air that the
+slab takes the place of, and its bending of rays, out of the path, which concerns the phase only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.constants import speed_of_light
+
+from simulator.geometry.mirrors import Mirrors
+from simulator.geometry.slabs import Slabs
+from simulator.materials.fresnel_slab import Dielectric
+from simulator.materials.permittivity import ConstantPermittivity
+from simulator.specular.image_method import find_chains
+from simulator.specular.path_field import specular_response
+from validation.analytic.sionna_paths import (
+    EDGE,
+    FREQUENCY,
+    RAYS,
+    SHORTEST_LEG,
+    THICKNESS,
+    Path,
+    RandomScene,
+    distance_from_edges,
+    random_scene,
+    solver_scene,
+)
+
+REFRACTION = 4
+"""Their name of what goes through. [-]"""
+
+MOST_MET = 3
+"""Surfaces that a path meets at most, reflected or let through. [-]"""
+
+WEAKEST_DB = 30.0
+"""How far below a receiver's strongest path the others are compared. [dB]"""
+
+Met = tuple[int, bool]
+"""A plate, and whether the path goes through it."""
+
+Paths = dict[tuple[int, tuple[Met, ...]], Path]
+"""By receiver, and what is met on the way."""
+
+
+def slab_scene(seed: int) -> RandomScene:
+    """Draw upright and tilted plates in a cubic metre, all of them slabs."""
+    drawn, rng = random_scene(seed), np.random.default_rng((seed, 17))
+    plates = [faces for faces in drawn.objects if len(faces) == 1]
+    constants = [
+        (complex(rng.uniform(1.5, 6.0), -rng.uniform(0.0, 0.1)), rng.uniform(*THICKNESS))
+        for _ in plates
+    ]
+    return RandomScene(plates, constants, drawn.points)
+
+
+def our_paths(scene: RandomScene) -> Paths:
+    """Find chains of mirrors and slabs that meet up to three plates."""
+    materials = tuple(
+        Dielectric(permittivity=ConstantPermittivity(value=value), thickness=thickness)
+        for value, thickness in scene.constants
+    )
+    mirrors = Mirrors(
+        corners=scene.corners,
+        materials=materials,
+        rms_heights=np.zeros(len(materials)),
+        two_sided=np.ones(len(materials), dtype=bool),
+    )
+    slabs = Slabs(faces=mirrors, owners=tuple(f"plate {n}" for n in range(len(materials))))
+    source, receivers = scene.points[:1], scene.points[1:]
+    found: Paths = {}
+    for chain in find_chains(
+        mirrors, source, receivers, blocked=lambda a, b: np.zeros(len(a), dtype=bool), slabs=slabs
+    ):
+        response = specular_response(
+            mirrors, [chain], np.array([FREQUENCY]), (1, len(receivers)), slabs=slabs
+        )[0, :, 0]
+        for index, receiver in enumerate(np.nonzero(chain.valid)[1].tolist()):
+            points = np.array([source[0], *chain.vertices[index], receivers[receiver]])
+            crossed = chain.crossed[index].tolist() if chain.crossed is not None else []
+            met: list[Met] = []
+            for leg, one in enumerate(crossed):
+                way = points[leg : leg + 2]
+                faces = [face for face in range(len(slabs)) if one >> face & 1]
+                heights = [abs(float(mirrors.heights(way[0], face))) for face in faces]
+                across = [abs(float(mirrors.normals[f] @ (way[1] - way[0]))) for f in faces]
+                order = np.argsort(np.divide(heights, across))
+                met += [(faces[place], True) for place in order]
+                met += [(chain.mirrors[leg], False)] if leg < len(chain.mirrors) else []
+            if len(met) <= MOST_MET:
+                path = Path(float(chain.lengths[index]), complex(response[receiver]), points)
+                found[receiver, tuple(met)] = path
+    return found
+
+
+def solver_paths(scene: RandomScene) -> Paths:
+    """Let the path solver find the paths, with refraction."""
+    import sionna.rt as rt
+
+    theirs, bodies = solver_scene(scene)
+    theirs.add(rt.Transmitter("source", position=scene.points[0].tolist()))
+    for index, point in enumerate(scene.points[1:]):
+        theirs.add(rt.Receiver(f"receiver-{index}", position=point.tolist()))
+    paths = rt.PathSolver(deterministic=True)(
+        theirs,
+        max_depth=MOST_MET,
+        samples_per_src=RAYS,
+        los=True,
+        specular_reflection=True,
+        diffuse_reflection=False,
+        refraction=True,
+        synthetic_array=False,
+        seed=1,
+    )
+    plate = {body.object_id: index for index, body in enumerate(bodies)}
+    valid, delays = (field.numpy()[:, 0, 0, 0] for field in (paths.valid, paths.tau))
+    amplitudes = (paths.a[0].numpy() + 1j * paths.a[1].numpy())[:, 0, 0, 0]
+    kinds, shapes, vertices = (
+        field.numpy()[:, :, 0, 0, 0]
+        for field in (paths.interactions, paths.objects, paths.vertices)
+    )
+    found: Paths = {}
+    for receiver, index in zip(*np.nonzero(valid), strict=True):
+        depth = int(np.count_nonzero(kinds[:, receiver, index]))
+        met = tuple(
+            (
+                plate[int(shapes[step, receiver, index])],
+                bool(kinds[step, receiver, index] == REFRACTION),
+            )
+            for step in range(depth)
+        )
+        hits = vertices[:depth, receiver, index].astype(float)
+        points = np.array([scene.points[0], *hits, scene.points[1 + receiver]])
+        length = float(delays[receiver, index]) * speed_of_light
+        found[int(receiver), met] = Path(length, complex(amplitudes[receiver, index]), points)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """Both ways' paths in one scene."""
+
+    through: int  # paths through at least one slab that both found
+    level: float  # largest difference of levels [dB]
+    length: float  # and of lengths [m]
+    alone: tuple[tuple[int, tuple[Met, ...]], ...]  # found by only one, though far from edges
+
+
+def compare_transmission(scene: RandomScene) -> Compared:
+    """Find the paths of a scene in both ways; what is faint, or near an edge, is left out."""
+    ours, theirs = our_paths(scene), solver_paths(scene)
+    strongest: dict[int, float] = {}
+    for found in (ours, theirs):
+        for (receiver, _), path in found.items():
+            strongest[receiver] = max(strongest.get(receiver, 0.0), abs(path.amplitude))
+    alone, both = [], []
+    for key in sorted(ours.keys() | theirs.keys()):
+        path = ours.get(key) or theirs[key]
+        faint = 10 ** (-WEAKEST_DB / 20) * strongest[key[0]]
+        if abs(path.amplitude) < faint or distance_from_edges(path, scene.corners) < EDGE:
+            continue
+        if key in ours and key in theirs:
+            both.append(key)
+        elif not (key in ours and path.shortest_leg < SHORTEST_LEG):
+            alone.append(key)
+    levels = [abs(20 * np.log10(abs(ours[k].amplitude / theirs[k].amplitude))) for k in both]
+    return Compared(
+        through=sum(any(through for _, through in key[1]) for key in both),
+        level=float(max(levels, default=0.0)),
+        length=max((abs(ours[k].length - theirs[k].length) for k in both), default=0.0),
+        alone=tuple(alone),
+    )
