@@ -62,7 +62,7 @@ def cases(inputs: Path) -> Iterator[Case]:
         frequency=measured.echo.frequencies,
     )
     from mmslam.formats.export_arrays import export_matlab, export_netcdf
-    from mmslam.measurement_files import export_to_touchstone, import_to_file
+    from mmslam.measured_data import export_to_touchstone, import_to_file
 
     yield _dataset_case(inputs)
     yield _run_case(measured)

@@ -5,9 +5,11 @@ from .commands.track import track
 from .datasets import open_dataset
 from .full_wave import simulate_full_wave
 from .library import Scenario, load_scenario, scenarios
+from .location import locate
+from .measured_data import import_measured
 from .measurement import Echo, Measurement, Uplink
-from .measurement_files import import_measured, read, write
-from .pipeline import locate, simulate
+from .measurement_files import read, write
+from .pipeline import simulate
 from .results.estimate import Estimate
 from .results.plots import plot_angle_range_map, plot_estimate, plot_image, plot_scenario, plot_user
 

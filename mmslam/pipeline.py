@@ -1,21 +1,15 @@
-"""From a scenario to a measurement, from a measurement to an answer, and to a folder of results."""
+"""From a scenario to a measurement, to an answer, and to a folder of results."""
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from estimator import localization
-from estimator.measurement import model
 from estimator.results.estimate import Progress
 from mmslam import output, own_results
+from mmslam.location import Outcome, locate, write_results
 from mmslam.measurement import Measurement
-from mmslam.measurement_files import read, write
-from mmslam.plain_text import file_name
-from mmslam.results.document import result_document, to_json
-from mmslam.results.estimate import Estimate
+from mmslam.measurement_files import write
 from mmslam.terminal.interruption import interruptions_held
+from scenes.files.loading import scenario_to_toml
 from scenes.scenario import Scenario, ScenarioError
 
 
@@ -60,51 +54,6 @@ def simulate(scenario: Scenario, *, seed: int = 0, progress: Progress | None = N
     return Measurement.of(found.measurement, beside=found.truth)
 
 
-def locate(
-    measurement: model.Measurement, *, images: bool = True, progress: Progress | None = None
-) -> Estimate:
-    """Find walls, targets and users from a measurement alone.
-
-    Parameters
-    ----------
-    measurement
-        Of a linear or a planar array; echo or uplinks may be missing. A truth beside it is taken
-        off first: the estimator is not given it.
-    images
-        Whether images and close-ups can be asked for later, when they are formed; the answer itself
-        does not need them.
-    progress
-        Told each stage.
-
-    Returns
-    -------
-    What was found, in the world frame. That nothing was found is an answer, too.
-
-    Raises
-    ------
-    MeasurementError
-        If the array is neither linear nor planar, or the frequencies are not uniform.
-
-    Examples
-    --------
-    >>> import mmslam
-    >>> small = {
-    ...     "base_station.elements": 48, "radio.stop_ghz": 230.0, "radio.points": 101,
-    ...     "objects.wall.centre_m": [0.0, 0.4], "objects.wall.length_m": 0.2,
-    ...     "users.user.position_m": [0.5, 0.4],
-    ... }
-    >>> measurement = mmslam.simulate(mmslam.load_scenario("slam_2d", small), seed=1)
-    >>> estimate = mmslam.locate(measurement)
-    >>> estimate.users["user"].status, estimate.users["user"].bounces
-    ('found', 1)
-    >>> off = estimate.users["user"].position - measurement.truth.user_position["user"]
-    >>> bool(abs(off).max() < 4 * estimate.users["user"].uncertainty_m)
-    True
-    """
-    seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
-    return Estimate.of(localization.locate(seen, images=images, progress=progress), seen)
-
-
 def simulate_to_file(
     scenario: Scenario, *, seed: int, path: Path, progress: Progress | None = None
 ) -> Measurement:
@@ -113,14 +62,6 @@ def simulate_to_file(
         measurement = simulate(scenario, seed=seed, progress=progress)
         write(new, measurement)
     return measurement
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What a command has written, and where."""
-
-    folder: Path
-    result: Mapping[str, Any]
 
 
 def run_scenario(
@@ -154,7 +95,7 @@ def run_scenario(
         write(new / own_results.MEASUREMENT, measurement)
         timings["write_measurement"] = time.perf_counter() - started
         estimate = locate(measurement, progress=progress)
-        result = _write_results(new, measurement, estimate, timings, scenario)
+        result = write_results(new, measurement, estimate, timings, scenario_to_toml(scenario))
     return Outcome(folder=folder, result=result)
 
 
@@ -177,61 +118,3 @@ def _refuse_what_cannot_be_located(scenario: Scenario) -> None:
             "base_station.transmit_offset_m: a planar array images its own echo only; leave the "
             "offset out. `mmslam simulate` takes any antennas"
         )
-
-
-def locate_measurement(
-    path: Path, *, sample: int | None, folder: Path | None, progress: Progress | None = None
-) -> Outcome:
-    """Estimate what is in a measurement file, and write it to a folder.
-
-    Parameters
-    ----------
-    path
-        The measurement store; its truth, if any, is opened after the estimate only.
-    sample
-        Which one of a dataset.
-    folder
-        As in :func:`run_scenario`; None: ``out/SCENARIO-SEED-located``.
-    progress
-        Told each stage's steps.
-    """
-    measurement = read(path, sample=sample)
-    folder = folder or default_folder(measurement, path, sample)
-    output.refuse_to_replace_input(folder, path)
-    with output.replacing(folder, own_results.refuse_foreign_results) as new:
-        new.mkdir()
-        estimate = locate(measurement, progress=progress)
-        result = _write_results(new, measurement, estimate, {}, None)
-    return Outcome(folder=folder, result=result)
-
-
-def default_folder(measurement: Measurement, path: Path, sample: int | None) -> Path:
-    """Name the folder for the estimate of a file: never the one of the run that wrote it."""
-    parts = [file_name(measurement.scenario or path.stem)]
-    if measurement.seed is not None:
-        parts.append(str(measurement.seed))
-    if sample is not None:
-        parts.append(f"sample{sample}")
-    return Path("out") / "-".join([*parts, "located"])
-
-
-def _write_results(
-    new: Path,
-    measurement: Measurement,
-    estimate: Estimate,
-    timings: dict[str, float],
-    scenario: Scenario | None,
-) -> Mapping[str, Any]:
-    # matplotlib's import takes half a second that other commands need not wait.
-    from mmslam.results.pictures_2d import write_pictures
-    from mmslam.results.report import render_report
-
-    truth = measurement.truth  # opened now, after the estimate
-    started = time.perf_counter()
-    pictures = write_pictures(new, measurement, estimate, truth)
-    timings = {**timings, "figures": time.perf_counter() - started}
-    result = result_document(measurement, estimate, truth, timings=timings)
-    report = render_report(result, measurement, pictures, scenario=scenario)
-    (new / own_results.REPORT).write_text(report, encoding="utf-8")
-    (new / own_results.RESULT).write_text(to_json(result), encoding="utf-8")
-    return result

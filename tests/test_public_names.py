@@ -25,6 +25,7 @@ EAGER = {
     "mmslam/cli": "the command line itself",
     "validation/claims": "the list of all claims",
     "validation/experiments": "programs, run by their names",
+    "validation/experiments/full_wave": "the same",
     "validation/reference": "two paths",
 }
 """Packages without lazy names, and why."""
@@ -97,6 +98,11 @@ def test_importing_mmslam_loads_neither_dr_jit_nor_sionna_nor_any_other_package(
     loaded = loaded_by("import mmslam; dir(mmslam); mmslam.__all__")
     assert not loaded & {*HEAVY, "numpy", "pydantic", "xarray", "zarr"}
     assert {name for name in loaded if name.partition(".")[0] in PACKAGES} == {"mmslam"}
+
+
+def test_what_only_locates_loads_no_model_of_scenarios_and_no_ray_tracer() -> None:
+    loaded = loaded_by("from mmslam.location import locate_measurement")
+    assert not loaded & {"matplotlib", "mitsuba", "sionna", "pydantic", "scenes.scenario"}
 
 
 def test_importing_any_package_that_needs_no_ray_tracer_stays_light() -> None:

@@ -62,7 +62,7 @@ def import_(
     `user_position` and `wall_profile`.
     """
     with told_clearly():
-        from mmslam.measurement_files import import_to_file
+        from mmslam.measured_data import import_to_file
 
         with stdout_kept_clean():
             measurement = import_to_file(source, mapping=mapping, uplink=uplink, path=output)
@@ -105,7 +105,7 @@ def export(
         if sum(one is not None for one in (touchstone, netcdf, matlab)) != 1:
             raise typer.BadParameter("give one of --touchstone, --netcdf and --matlab")
         if touchstone is not None:
-            from mmslam.measurement_files import export_to_touchstone
+            from mmslam.measured_data import export_to_touchstone
 
             if sample is not None and len(sample) > 1:
                 raise typer.BadParameter("--touchstone takes one --sample at a time")

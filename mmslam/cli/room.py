@@ -144,7 +144,7 @@ def locate(
         from mmslam.terminal.stage_progress import StageProgress
 
         with stdout_kept_clean(), StageProgress() as progress:
-            from mmslam.pipeline import locate_measurement
+            from mmslam.location import locate_measurement
 
             outcome = locate_measurement(measurement, sample=sample, folder=out, progress=progress)
         print_outcome(outcome.result, outcome.folder, as_json)

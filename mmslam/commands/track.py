@@ -17,9 +17,9 @@ from estimator.measurement.store import PARAMETERS, TRUTH
 from estimator.results.estimate import Progress, UserEstimate
 from estimator.tracking.multi_hypothesis import ACCELERATION, TrackPoint
 from mmslam import output, own_results
+from mmslam.location import locate
 from mmslam.measurement_files import read
 from mmslam.moving_users import MovingUser, track_answers
-from mmslam.pipeline import locate
 from mmslam.results.document import plain, to_json, versions
 from mmslam.results.tracks import Tracks
 from validation.metrics.errors import position_error

@@ -12,8 +12,6 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Measurement
 from mmslam.plain_text import visible
-from scenes.files.loading import scenario_to_toml
-from scenes.scenario import Scenario
 
 CAPTIONS = {
     "localization.png": "Plan of what was found; the user enlarged, with its error ellipses.",
@@ -30,7 +28,7 @@ def render_report(
     measurement: Measurement,
     pictures: Mapping[str, Path],
     *,
-    scenario: Scenario | None = None,
+    scenario: str | None = None,
 ) -> str:
     """Write the page that tells one result.
 
@@ -72,7 +70,7 @@ def render_report(
             for name, caption in CAPTIONS.items()
             if name in pictures
         ],
-        scenario=None if scenario is None else scenario_to_toml(scenario),
+        scenario=scenario,
         pi=math.pi,
     )
 

@@ -13,7 +13,7 @@ from mmslam.commands.track import _times
 from mmslam.formats.array_files import ArrayFiles
 from mmslam.formats.export_arrays import export_matlab
 from mmslam.formats.file_pattern import fields_of_pattern
-from mmslam.pipeline import default_folder
+from mmslam.location import default_folder
 from scenes.files.loading import load_scenario
 from scenes.meshes.mitsuba_xml import read_mitsuba_xml
 from scenes.sampling.distributions import InPolygon

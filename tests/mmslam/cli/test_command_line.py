@@ -48,9 +48,7 @@ def test_version_is_that_of_the_distribution() -> None:
     assert mmslam("--version").stdout == f"mmslam {version('mmslam')}\n"
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--help"], ["--version"], ["scenes"], ["scenes", "slam_2d"]]
-)
+@pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["scenes", "slam_2d"]])
 def test_what_simulates_nothing_loads_neither_the_ray_tracer_nor_matplotlib(
     arguments: list[str],
 ) -> None:

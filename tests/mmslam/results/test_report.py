@@ -9,7 +9,7 @@ from estimator.results.estimate import Estimate
 from mmslam.results.document import result_document
 from mmslam.results.pictures_2d import write_pictures
 from mmslam.results.report import radio_parameters, render_report
-from scenes.files.loading import load_scenario
+from scenes.files.loading import load_scenario, scenario_to_toml
 from validation.metrics.truth import Truth
 
 
@@ -17,7 +17,9 @@ from validation.metrics.truth import Truth
 def page(tmp_path: Path, measurement: Measurement, estimate: Estimate, truth: Truth) -> str:
     pictures = write_pictures(tmp_path, measurement, estimate, truth)
     result = result_document(measurement, estimate, truth)
-    return render_report(result, measurement, pictures, scenario=load_scenario("slam_2d"))
+    return render_report(
+        result, measurement, pictures, scenario=scenario_to_toml(load_scenario("slam_2d"))
+    )
 
 
 def test_the_page_needs_no_other_file_and_no_network(page: str) -> None:
