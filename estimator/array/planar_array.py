@@ -66,6 +66,13 @@ def spans_a_plane(positions: Float[np.ndarray, "positions 3"]) -> bool:
     return bool(extents[1] > max(PLANAR * extents[0], LEAST_WIDTH * FLATNESS))
 
 
+def is_flat(positions: Float[np.ndarray, "positions 3"]) -> bool:
+    """Tell whether phase centres lie in a plane, to :data:`FLATNESS`."""
+    centred = positions - positions.mean(axis=0)
+    normal = np.linalg.svd(centred, full_matrices=False)[2][2]
+    return bool(np.abs(centred @ normal).max() <= FLATNESS)
+
+
 def planar_frame(
     positions: Float[np.ndarray, "positions 3"], boresight: Float[np.ndarray, " 3"]
 ) -> ArrayFrame:
@@ -101,8 +108,8 @@ def planar_frame(
     ahead = np.where(np.abs(ahead) < ROUNDING, 0.0, ahead)
     ahead = ahead / np.linalg.norm(ahead)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
-    if np.linalg.norm(right) < 1e-6:  # it looks straight up or down
-        right = directions[0]
+    if np.linalg.norm(right) < 1e-6:  # it looks straight up or down: x is what is horizontal
+        right = np.array([1.0, 0.0, 0.0]) - ahead[0] * ahead
     right = right / np.linalg.norm(right)
     return ArrayFrame(origin=origin, axes=np.stack([right, ahead, np.cross(right, ahead)]))
 

@@ -5,7 +5,7 @@ stored as one cubic polynomial per cell. Reading it anywhere then costs two pack
 instead of a sum over the frequencies.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import finufft
 import numpy as np
@@ -117,6 +117,30 @@ def range_profiles(
         legs=legs,
         passes=2 if two_way else 1,
         gain=gain,
+    )
+
+
+def repeated(profiles: RangeProfiles, longest: float) -> RangeProfiles:
+    """Continue profiles periodically beyond the unambiguous path.
+
+    On a uniform frequency grid the sum over frequencies has this period. What tells the periods
+    apart then is the aperture: near it a wavefront is round enough.
+
+    Parameters
+    ----------
+    profiles
+        Of uniform frequencies.
+    longest
+        Path length that must be covered. [m]
+    """
+    times = int(np.ceil(longest / profiles.unambiguous))
+    cells = round(profiles.unambiguous / profiles.cell)
+    if times < 2 or profiles.coefficients.shape[1] != cells:
+        return profiles
+    return replace(
+        profiles,
+        coefficients=np.tile(profiles.coefficients, (1, times, 1)),
+        unambiguous=times * profiles.unambiguous,
     )
 
 

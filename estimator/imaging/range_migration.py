@@ -90,17 +90,59 @@ def range_migration(
     spectrum = _gated(samples, echo, *_ranges(echo, grid))
     wavelength = speed_of_light / float(echo.frequencies[0])
     axes = tuple(
-        _axis(echo.positions[:, i], pixels, depth, spectrum.far, wavelength)
+        transform_axis(echo.positions[:, i], pixels, depth, spectrum.far, wavelength)
         for i, pixels in ((0, grid.x), (2, grid.z))
     )
-    planes = _over_aperture(spectrum.values, echo.positions[:, ::2], axes)
+    planes = over_aperture(spectrum.values, echo.positions[:, ::2], axes)
     corner = (grid.x[0] - axes[0].start, depth[0], grid.z[0] - axes[1].start)
     image = stolt(planes, spectrum, axes, depth, corner)
-    image = _at_pixels(image, 0, axes[0], grid.x)
-    image = _at_pixels(image, 1, axes[1], grid.z)
+    image = at_pixels(image, 0, axes[0], grid.x)
+    image = at_pixels(image, 1, axes[1], grid.z)
     spread = 2j * np.pi * depth
     result = image * (np.sqrt(spread) if axes[1].size == 1 else spread) / gain
     return np.ascontiguousarray(result.transpose(0, 2, 1)).reshape(grid.shape)
+
+
+def suits_range_migration(echo: Echo, grid: PixelGrid) -> bool:
+    """Tell whether range migration takes a geometry; if not, back-projection does.
+
+    Parameters
+    ----------
+    echo, grid
+        As in :func:`range_migration`.
+    """
+    spans = [
+        max(pixels[-1] - ends.min(), ends.max() - pixels[0])
+        for pixels, ends in zip((grid.x, grid.y, grid.z), echo.positions.T, strict=True)
+    ]
+    near = float(np.linalg.norm(spans)) <= unambiguous_path(echo.frequencies) / 2
+    return near and echo.frequencies.size > 1 and is_lattice(echo, grid)
+
+
+def is_lattice(echo: Echo, grid: PixelGrid) -> bool:
+    """Tell whether the positions lie on a line or a grid before the pixels, monostatic."""
+    x, y, z = echo.positions.T
+    if echo.transmit_positions is not None or np.ptp(y) > 1e-6 or np.ptp(x) < 1e-9:
+        return False
+    if grid.y[0] <= y[0]:
+        return False
+    if np.ptp(z) < 1e-9:
+        return bool(np.abs(grid.z - z[0]).max() <= 1e-6)
+    for column in (x, z):
+        first, spacing = _lattice(column)
+        places = (column - first) / spacing
+        if np.abs(places - np.rint(places)).max() > LATTICE:
+            return False
+    return True
+
+
+def _lattice(positions: Float[np.ndarray, " positions"]) -> tuple[float, float]:
+    """Return the first place and the spacing of positions along one axis. [m]."""
+    places = np.unique(np.round(positions, 12))
+    steps = np.diff(places)
+    spacing = float(np.median(steps[steps > 0.5 * np.median(steps)]))
+    low, high = float(places[0]), float(places[-1])
+    return low, (high - low) / max(1, round((high - low) / spacing))
 
 
 def _refuse_other_geometry(echo: Echo, grid: PixelGrid) -> None:
@@ -163,10 +205,10 @@ def _gated(
         padded = np.zeros((len(samples), cells), dtype=np.complex64)
         padded[:, whole] = samples
         profiles = scipy.fft.ifft(padded, axis=1, norm="forward", workers=-1)
-        window = profiles[:, np.arange(first, first + count) % cells]
         if count >= cells:  # the whole period is needed: nothing to cut
-            window = np.roll(profiles, -first, axis=1)
+            first = int(np.floor(0.5 * (near + far) / cell)) - cells // 2
             count, margin = cells, 0
+        window = profiles[:, np.arange(first, first + count) % cells]
     else:
         phase = 2 * np.pi * offsets / cells
         shifted = samples * np.exp(1j * phase * (first + count // 2))
@@ -196,7 +238,7 @@ def _slopes(count: int, margin: int) -> Float[np.ndarray, " count"]:
     return gate
 
 
-def _axis(
+def transform_axis(
     positions: Float[np.ndarray, " positions"],
     pixels: Float[np.ndarray, " n"],
     depth: Float[np.ndarray, " ny"],
@@ -207,10 +249,8 @@ def _axis(
     places = np.unique(np.round(positions, 12))
     if places[-1] - places[0] < 1e-9:
         return ApertureAxis(start=float(places[0]), spacing=1.0, size=1, tangent=1.0, slope=1.0)
-    steps = np.diff(places)
-    spacing = float(np.median(steps[steps > 0.5 * np.median(steps)]))
-    low, high = float(places[0]), float(places[-1])
-    spacing = (high - low) / max(1, round((high - low) / spacing))
+    high = float(places[-1])
+    low, spacing = _lattice(positions)
     widest = max(float(pixels[-1]) - low, high - float(pixels[0]))
     tangent = widest / float(depth[0])
     slope = FRESNEL_MARGIN * float(np.sqrt(wavelength / (2 * depth[0])))
@@ -230,7 +270,7 @@ def _axis(
     return ApertureAxis(start=low, spacing=spacing, size=size, tangent=tangent, slope=slope)
 
 
-def _over_aperture(
+def over_aperture(
     values: Complex64[np.ndarray, "positions freqs"],
     positions: Float[np.ndarray, "positions 2"],
     axes: tuple[ApertureAxis, ...],
@@ -260,7 +300,7 @@ def _over_aperture(
     return np.asarray(planes)
 
 
-def _at_pixels(
+def at_pixels(
     spectrum: Complex64[np.ndarray, "kx kz ny"],
     dimension: int,
     axis: ApertureAxis,

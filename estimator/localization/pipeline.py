@@ -7,18 +7,36 @@ measures in space: only the stages that image, map and fit differ.
 import time
 from dataclasses import replace
 
-from estimator.array.planar_array import spans_a_plane
+from estimator.array.planar_array import is_flat, spans_a_plane
+from estimator.array.viewpoint import viewpoint
+from estimator.imaging.energy_region import middles
 from estimator.localization.clock import clock_note, on_our_clock
 from estimator.localization.close_up import close_up
 from estimator.localization.frames import local_echo, local_uplink, user_in_world
 from estimator.localization.stages import MappedRoom, Stages
 from estimator.localization.stages_2d import LinearStages
 from estimator.localization.stages_3d import PlanarStages
-from estimator.measurement.model import Measurement, frequency_step
+from estimator.localization.stages_free import FreeStages
+from estimator.measurement.model import Echo, Measurement, frequency_step
 from estimator.positioning.decision_rules import decide
 from estimator.positioning.map_context import no_image
 from estimator.results.deferred import Deferred
 from estimator.results.estimate import AngleRangeMap, DirectionMap, Estimate, Images, Progress
+
+
+def _stages(
+    measurement: Measurement,
+) -> tuple[Stages[AngleRangeMap] | Stages[DirectionMap], tuple[str, ...]]:
+    """Choose the stages by the array's shape, and say what was assumed."""
+    measured = measurement.echo or measurement.uplinks[0]
+    places = middles(measured) if isinstance(measured, Echo) else measured.positions
+    if not spans_a_plane(places):
+        return LinearStages(), ()
+    view = viewpoint(places, measurement.boresight)
+    told = (view.note,) if view.note else ()
+    if view.ahead and is_flat(places):
+        return PlanarStages(view=view), told
+    return FreeStages(view=view), told
 
 
 def locate(
@@ -43,16 +61,15 @@ def locate(
     Raises
     ------
     MeasurementError
-        If the array is neither linear nor planar, the frequency grid is not uniform, or the echo
-        or the waves are such as an array of its shape cannot take.
+        If there is one position only, pilots came to an array that is neither linear nor planar,
+        the frequency grid is not uniform, or the waves are such as an array of its shape cannot
+        take.
     """
     measured = measurement.echo or measurement.uplinks[0]
-    stages: Stages[AngleRangeMap] | Stages[DirectionMap] = (
-        PlanarStages() if spans_a_plane(measured.positions) else LinearStages()
-    )
+    stages, assumed = _stages(measurement)
     tell = progress or (lambda stage, done, total: None)
     timings: dict[str, float] = {}
-    notes: list[str] = []
+    notes: list[str] = list(assumed)
     clock_known = measurement.clock_offset is not None
     echo, uplinks = measurement.echo, on_our_clock(measurement)
     frequency_step(measured.frequencies)  # refused before any work

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from estimator.array.array_frame import ArrayFrame, array_frame
-from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
+from estimator.array.linear_array import NEAREST, echo_reach, echo_resolution, imaged_sine
 from estimator.channel.angle_range_map_2d import (
     angle_range_map,
     default_angles,
@@ -16,7 +16,10 @@ from estimator.channel.angle_range_map_2d import (
 )
 from estimator.channel.path_extraction_2d import find_paths
 from estimator.localization.aliasing import aliasing_notes
-from estimator.localization.stages import Heard
+from estimator.localization.close_range import close_scene
+from estimator.localization.constant_room import RoomBehindConstant
+from estimator.localization.imaged_scene import imaged_scene
+from estimator.localization.stages import Heard, MappedRoom
 from estimator.mapping.map_2d import RoomMap, build_room_map, mirrors_in_world, targets_in_world
 from estimator.mapping.map_images_2d import room_images
 from estimator.measurement.model import Echo, Measurement, Uplink
@@ -29,6 +32,7 @@ from estimator.results.estimate import (
     Target,
     UserEstimate,
 )
+from estimator.walls.shared_constant import without_constant
 
 MAP_SAMPLES = 1.5
 """Samples of the angle/range map for each -3 dB width: a peak between them loses 1.3 dB at
@@ -89,8 +93,18 @@ class LinearStages:
         measured = measurement.echo or measurement.uplinks[0]
         return array_frame(measured.positions, measurement.boresight)
 
-    def map_room(self, echo: Echo) -> LinearRoom:
-        """Find mirrors and targets in an echo in the array's frame."""
+    def map_room(self, echo: Echo) -> MappedRoom:
+        """Find mirrors and targets in an echo in the array's frame; or image what is close."""
+        shared = without_constant(echo)
+        room = self._mapped(shared.echo)
+        return room if shared.level_db is None else RoomBehindConstant(room=room, shared=shared)
+
+    def _mapped(self, echo: Echo) -> MappedRoom:
+        reason = close_scene(
+            echo, nearest=NEAREST * float(np.ptp(echo.positions[:, 0])), planar=False
+        )
+        if reason is not None:
+            return imaged_scene(echo, ahead=True, flat=True, reason=reason)
         return LinearRoom(echo=echo, map=build_room_map(echo))
 
     def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[AngleRangeMap]:

@@ -11,15 +11,18 @@ from estimator.array.array_frame import ArrayFrame
 from estimator.array.planar_array import (
     PlanarArray,
     planar_array,
-    planar_frame,
     planar_reach,
     planar_resolution,
 )
+from estimator.array.viewpoint import Viewpoint
 from estimator.channel.angle_range_map_3d import direction_map
 from estimator.channel.path import LEAST_SHARE
 from estimator.channel.path_extraction_3d import find_space_paths
 from estimator.localization.aliasing import aliasing_notes
-from estimator.localization.stages import Heard
+from estimator.localization.close_range import close_scene, too_large
+from estimator.localization.constant_room import RoomBehindConstant
+from estimator.localization.imaged_scene import imaged_scene
+from estimator.localization.stages import Heard, MappedRoom
 from estimator.mapping.map_3d import (
     SpaceMap,
     build_space_map,
@@ -37,6 +40,11 @@ from estimator.results.estimate import (
     Target,
     UserEstimate,
 )
+from estimator.walls.shared_constant import without_constant
+
+CLOSE = 1.5
+"""Distance of the strongest thing, over the aperture's diagonal, below which a scene is close: a
+room's things are farther away, and polar cells of the array's centre hold there. [-]"""
 
 
 @dataclass(frozen=True)
@@ -91,23 +99,32 @@ class PlanarRoom:
 class PlanarStages:
     """The stages of a planar array."""
 
+    view: Viewpoint
+
     def frame(self, measurement: Measurement) -> ArrayFrame:
-        """Find the array's frame; refuse waves of the plane and transmitters apart."""
+        """Return the array's frame; refuse waves of the plane."""
         if measurement.waves != "spherical":
             raise MeasurementError(
                 f"waves = {measurement.waves!r}: a planar array measures in space, where waves are "
                 "spherical; measure with a linear array, or give the measurement its true waves"
             )
-        if measurement.echo is not None and measurement.echo.transmit_positions is not None:
-            raise MeasurementError(
-                "echo: transmit positions stand apart; in space only a monostatic echo is imaged"
-            )
-        measured = measurement.echo or measurement.uplinks[0]
-        return planar_frame(measured.positions, measurement.boresight)
+        return self.view.frame
 
-    def map_room(self, echo: Echo) -> PlanarRoom:
-        """Find walls and targets in an echo in the array's frame."""
+    def map_room(self, echo: Echo) -> MappedRoom:
+        """Find walls and targets in an echo in the array's frame; or image what is close."""
+        shared = without_constant(echo)
+        room = self._mapped(shared.echo)
+        return room if shared.level_db is None else RoomBehindConstant(room=room, shared=shared)
+
+    def _mapped(self, echo: Echo) -> MappedRoom:
+        if echo.transmit_positions is not None:
+            reason = "transmitters stand apart from the receivers of a planar array"
+            return imaged_scene(echo, ahead=True, flat=False, reason=reason)
         array = planar_array(echo.positions)
+        close = close_scene(echo, nearest=CLOSE * 2 * array.half, planar=True)
+        unsuited = close or too_large(echo, array)
+        if unsuited is not None:
+            return imaged_scene(echo, ahead=True, flat=False, reason=unsuited)
         return PlanarRoom(echo=echo, array=array, map=build_space_map(echo, array))
 
     def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[DirectionMap]:
