@@ -17,6 +17,7 @@ from estimator.array.planar_array import PlanarArray, planar_reach, planar_resol
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.peak_detection import image_contrast, mean_background, peak_threshold
+from estimator.imaging.range_compression import unambiguous_path
 from estimator.measurement.model import Echo
 
 STEP = 0.75
@@ -223,6 +224,9 @@ def brighter_elsewhere(
         Their intensities. [-]
     """
     points, real = lobe_origins(echo, array, peaks)
+    # Where the farthest element's path is ambiguous there is no image to look at.
+    reach = np.linalg.norm(points, axis=-1) + array.half
+    real &= reach < unambiguous_path(echo.frequencies) / 2
     if not real.any():
         return np.zeros(len(peaks), dtype=bool)
     there = np.zeros(real.shape)

@@ -15,6 +15,7 @@ from estimator.channel.angle_range_map_2d import (
     default_path_lengths,
 )
 from estimator.channel.path_extraction_2d import find_paths
+from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes
 from estimator.localization.close_range import close_scene
 from estimator.localization.constant_room import RoomBehindConstant
@@ -100,9 +101,10 @@ class LinearStages:
         return room if shared.level_db is None else RoomBehindConstant(room=room, shared=shared)
 
     def _mapped(self, echo: Echo) -> MappedRoom:
-        reason = close_scene(
-            echo, nearest=NEAREST * float(np.ptp(echo.positions[:, 0])), planar=False
-        )
+        nearest = NEAREST * float(np.ptp(echo.positions[:, 0]))
+        if unambiguous_path(echo.frequencies) / 2 < nearest:
+            echo_reach(echo)  # refuses it: all ranges would seem close
+        reason = close_scene(echo, nearest=nearest, planar=False)
         if reason is not None:
             return imaged_scene(echo, ahead=True, flat=True, reason=reason)
         return LinearRoom(echo=echo, map=build_room_map(echo))

@@ -18,7 +18,7 @@ FAINTEST = 1e-2
 """Intensity over the brightest target's of what still is one: −20 dB, above what a lobe of an
 extended target reaches at a few frequencies. [-]"""
 FAINTEST_ALIASED = 0.25
-"""The same where neighbouring positions are more than λ/4 apart: of λ/2 apart, grating lobes near the
+"""The same where neighbouring positions are more than λ/4 apart: at λ/2, grating lobes near the
 aperture reach −7.5 dB. [-]"""
 REGION = 0.1
 """Intensity over a target's peak that still belongs to it. [-]"""
@@ -111,7 +111,7 @@ def image_targets(
 def _aliased(echo: Echo) -> bool:
     """Tell whether the spacing leaves grating lobes somewhere in front. [-]."""
     places = middles(echo)
-    nearest = cKDTree(places).query(places, k=2)[0][:, 1]
+    nearest = np.asarray(cKDTree(places).query(places, k=2)[0])[:, 1]
     wavelength = speed_of_light / float(echo.frequencies[-1])
     return float(np.median(nearest)) > largest_spacing(wavelength)
 
