@@ -10,7 +10,7 @@ from estimator.array.array_frame import ArrayFrame
 from estimator.localization.stages import MappedRoom
 from estimator.measurement.model import Uplink
 from estimator.positioning.map_context import MapContext
-from estimator.results.estimate import CorrectedImage, Image, Mirror, Target, UserEstimate
+from estimator.results.estimate import Images, Mirror, Target, UserEstimate
 from estimator.walls.shared_constant import CONFIDENCE, SharedConstant
 
 
@@ -45,9 +45,7 @@ class RoomBehindConstant:
         """Return the targets in the world's frame."""
         return self.room.targets(frame)
 
-    def images(
-        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
-    ) -> tuple[Image, CorrectedImage]:
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
         """Form both images of the rest."""
         return self.room.images(frame, paths)
 

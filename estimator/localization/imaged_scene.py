@@ -18,7 +18,7 @@ from estimator.imaging.scene_image import ImageOptions, in_world, scene_grid, sc
 from estimator.mapping.image_targets import image_targets
 from estimator.measurement.model import Echo, Uplink
 from estimator.positioning.map_context import MapContext, no_image
-from estimator.results.estimate import CorrectedImage, Image, Mirror, Target, UserEstimate
+from estimator.results.estimate import CorrectedImage, Image, Images, Mirror, Target, UserEstimate
 from estimator.results.pixel_grid import PixelGrid
 
 
@@ -58,9 +58,7 @@ class ImagedScene:
             for target in self.found
         )
 
-    def images(
-        self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]
-    ) -> tuple[Image, CorrectedImage]:
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
         """Return the image, twice: there are no ghosts to unfold."""
         grid, values = in_world(self.values, self.grid, frame)
         if grid is None:  # not parallel to the world's axes: focused anew
@@ -69,7 +67,7 @@ class ImagedScene:
         values = values.reshape(grid.shape)
         chain = np.zeros(grid.shape, dtype=np.int64)
         corrected = CorrectedImage(values=values, grid=grid, chains=((),), chain=chain)
-        return Image(values=values, grid=grid), corrected
+        return Images(raw=Image(values=values, grid=grid), corrected=corrected)
 
     def _around(self, frame: ArrayFrame) -> PixelGrid:
         axes = (self.grid.x, self.grid.y, self.grid.z)
