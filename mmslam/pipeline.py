@@ -44,6 +44,7 @@ def simulate(scenario: Scenario, *, seed: int = 0, progress: Progress | None = N
     """
     with interruptions_held() as let_through:
         from simulator import simulation  # Sionna's import takes seconds
+        from simulator.scene.left_out import model_told
 
         def step(stage: str, done: int, total: int) -> None:
             let_through()
@@ -51,7 +52,8 @@ def simulate(scenario: Scenario, *, seed: int = 0, progress: Progress | None = N
                 progress(stage, done, total)
 
         found = simulation.simulate(scenario, seed=seed, progress=step)
-    return Measurement.of(found.measurement, beside=found.truth)
+        truth = found.truth.assign_attrs(model_told(scenario))
+    return Measurement.of(found.measurement, beside=truth)
 
 
 def simulate_to_file(

@@ -120,10 +120,13 @@ def simulate(
                 )
             else:
                 from mmslam.pipeline import simulate_to_file
+                from simulator.scene.left_out import model_lines
                 from simulator.scene.model_limits import model_notes
 
                 measurement = simulate_to_file(loaded, seed=seed, path=output, progress=progress)
-                notes = model_notes(loaded, seed=seed)
+                told = measurement.truth_dataset
+                lines = model_lines(told.attrs) if told is not None else ()
+                notes = (*model_notes(loaded, seed=seed), *lines)
         print_written(output, measurement, as_json, notes)
 
 

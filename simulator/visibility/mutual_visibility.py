@@ -47,11 +47,15 @@ class MutualVisibility:
         """
         through = self._look_up(one, other)
         found = []
-        for number in np.unique(through[through >= 0]).tolist():
-            crossings = self.slabs.crossings(self._sets[number])
-            if passage_level(crossings, np.linspace(*self.band, 33)) >= LEAST_LEVEL:
-                found.append(Sight(crossings, np.asarray(through == number)))
+        for number, slabs in enumerate(self._sets):
+            crossings = self.slabs.crossings(slabs)
+            seen = np.asarray(through == number)
+            if seen.any() and self._level(crossings) >= LEAST_LEVEL:
+                found.append(Sight(crossings, seen))
         return tuple(found)
+
+    def _level(self, crossings: tuple[Crossing, ...]) -> float:
+        return passage_level(crossings, np.linspace(*self.band, 33)) if crossings else 1.0
 
     def _look_up(self, one: Face, other: Face) -> Int[np.ndarray, "one other"]:
         """Return the number of the set of slabs between two facets; -1: they are hidden."""
