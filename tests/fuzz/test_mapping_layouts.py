@@ -82,7 +82,8 @@ def _lay_out(
     shape: list[int],
     lines: dict[str, np.ndarray],
 ) -> None:
-    top, echo = layout.lines.setdefault("", []), []
+    top = layout.lines.setdefault("", [])
+    echo: list[str] = []
     values = layout.samples.reshape(*shape, -1)
     frequencies = layout.frequencies
     if rng.random() < 0.3:
