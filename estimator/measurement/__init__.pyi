@@ -5,6 +5,7 @@ from .calibration import (
     subtract_background,
     without_frequencies,
 )
+from .focus_delay import FocusDelay, focus_delay
 from .frequency_resampling import EqualSteps, to_equal_steps
 from .model import Echo, Measurement, MeasurementError, Uplink, Waves, frequency_step
 from .shared_signal import SharedSignal, shared_signal, without_delays, without_shared_signal
@@ -13,12 +14,14 @@ from .store import is_store, measurement_to_dataset, read_measurement, write_mea
 __all__ = [
     "Echo",
     "EqualSteps",
+    "FocusDelay",
     "Measurement",
     "MeasurementError",
     "SharedSignal",
     "Uplink",
     "Waves",
     "equalise",
+    "focus_delay",
     "frequency_step",
     "is_store",
     "measured_response",

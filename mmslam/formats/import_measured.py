@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.calibration import equalise, remove_path, subtract_background
@@ -21,7 +22,8 @@ from estimator.measurement.shared_signal import (
     without_shared_signal,
 )
 from mmslam.formats.array_reader import FILES, ArrayReader
-from mmslam.formats.boresight import boresight_of
+from mmslam.formats.checks.boresight import boresight_of
+from mmslam.formats.checks.focus_check import delay_by_focus, focus_notes
 from mmslam.formats.mapping import SweepMapping
 from mmslam.formats.measured_signals import (
     FolderReader,
@@ -81,6 +83,8 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             f"{source}: in a medium of refractive index {mapping.refractive_index:g}: frequencies "
             "are stored times it, lengths are the medium's"
         )
+    given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
+    boresight, remark = None, None
     echo = None
     if mapping.echo is not None:
         found = reader.signal("echo", mapping.echo)
@@ -92,7 +96,9 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 frequencies=found.frequencies,
                 transmit_positions=transmitters,
             )
-        echo = _calibrated(reader, raw, mapping.echo, "echo")
+        boresight, remark = boresight_of(str(source), raw.positions, given)
+        echo = _calibrated(reader, raw, mapping.echo, "echo", boresight)
+        notes += focus_notes(f"{source}: echo", echo, boresight, clock_known=True)
         notes += _notes(source, "echo", echo, found, stepped=stepped)
         echo = _in_medium(echo, mapping.refractive_index)
     uplinks = []
@@ -106,12 +112,15 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
                 frequencies=found.frequencies,
                 user=user,
             )
-        pilot = _calibrated(reader, pilot, table, name)
+        if boresight is None:
+            boresight, remark = boresight_of(str(source), pilot.positions, given)
+        pilot = _calibrated(reader, pilot, table, name, boresight)
+        notes += focus_notes(
+            f"{source}: {name}", pilot, boresight, clock_known=mapping.clock_offset_ns is not None
+        )
         notes += _notes(source, name, pilot, found, stepped=stepped)
         uplinks.append(_in_medium(pilot, mapping.refractive_index))
-    array = echo.positions if echo is not None else uplinks[0].positions
-    given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
-    boresight, remark = boresight_of(str(source), array, given)
+    assert boresight is not None  # a mapping without any signal is refused
     notes += [] if remark is None else [remark]
     clock = mapping.clock_offset_ns
     with told(source):
@@ -145,7 +154,13 @@ def _transmitters(reader: SignalReader, table: EchoTable, found: Signal) -> Posi
     return found.transmit_positions
 
 
-def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str) -> Data:
+def _calibrated(
+    reader: SignalReader,
+    data: Data,
+    table: SignalTable,
+    name: str,
+    boresight: Float[np.ndarray, " 3"],
+) -> Data:
     if table.background is not None:
         empty = reader.background(name, table, table.background)
         same = empty.positions.shape == data.positions.shape and len(data.positions) > 1
@@ -169,8 +184,9 @@ def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str)
                     "its frequencies differ from the measurement's; measure both on one grid"
                 )
             data = equalise(data, through.samples[0], phase_only=table.response.phase_only)
-    # The delay in air has the same phase: l = τ·c.
-    data = remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
+    if table.cable_delay_ns != "focus":
+        # The delay in air has the same phase: l = τ·c.
+        data = remove_path(data, table.cable_delay_ns * 1e-9 * speed_of_light)
     if table.subtract_shared is not None:
         shared = table.subtract_shared
         with told(f"{name}.subtract_shared"):
@@ -179,6 +195,9 @@ def _calibrated(reader: SignalReader, data: Data, table: SignalTable, name: str)
         with told(f"{name}.gate_out_ns"):
             first, last = (1e-9 * one for one in table.gate_out_ns)
             data = without_delays(data, first, last)
+    if table.cable_delay_ns == "focus":
+        with told(f"{name}.cable_delay_ns"):
+            data = remove_path(data, delay_by_focus(data, boresight))
     return data
 
 

@@ -141,8 +141,10 @@ class SignalTable(SamplesTable):
         description="delays, there and back, that are taken out (an antenna's own mismatch), "
         "counted after cable_delay_ns",
     )
-    cable_delay_ns: float = Field(
-        default=0.0, description="the delay of all cables in the signal's way, there and back"
+    cable_delay_ns: float | Literal["focus"] = Field(
+        default=0.0,
+        description='the delay of all cables in the signal\'s way, there and back; "focus": as '
+        "the curvature of the strongest point's wave tells it",
     )
 
 
