@@ -48,7 +48,7 @@ def focus_notes(
     distance = 1 / found.curvature
     off = found.curvature_deviation * distance**2
     return [
-        f"{name}: the strongest point is {distance:.4g} ± {off:.2g} m away by its wave's curvature, "
+        f"{name}: the strongest point is {distance:.4g} ± {off:.2g} m away by its curvature, "
         f"and its delay is that of a path {found.excess:+.4g} ± {found.excess_deviation:.2g} m "
         f"other: if cables and antennas delay by {1e9 * found.excess / speed_of_light:.4g} ns, add "
         'that to cable_delay_ns (or set cable_delay_ns = "focus"); a round target shortens it too'
@@ -68,8 +68,8 @@ def delay_by_focus(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> f
         part = "no wave" if found is None else f"one point's wave holds {found.coherence:.0%}"
         raise MeasurementError(
             f'"focus" needs a single point that is far the strongest ({part} of the power, at '
-            f"least {SINGLE:.0%}): put up a corner reflector, subtract what all positions share, or give "
-            "the delay"
+            f"least {SINGLE:.0%}): put up a corner reflector, subtract what all positions share, or "
+            "give the delay"
         )
     if found.curvature <= 0 or not _tells_a_distance(found):
         raise MeasurementError(
