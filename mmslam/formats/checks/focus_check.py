@@ -68,8 +68,8 @@ def delay_by_focus(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> f
         part = "no wave" if found is None else f"one point's wave holds {found.coherence:.0%}"
         raise MeasurementError(
             f'"focus" needs a single point that is far the strongest ({part} of the power, at '
-            f"least {SINGLE:.0%}): put up a corner reflector, subtract what all positions share, or "
-            "give the delay"
+            f"least {SINGLE:.0%}): put up a corner reflector, subtract what all positions share, "
+            "or give the delay"
         )
     if found.curvature <= 0 or not _tells_a_distance(found):
         raise MeasurementError(
