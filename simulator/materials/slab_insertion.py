@@ -13,7 +13,7 @@ with the sideways shift :math:`s` of a ray through the slab (Snell). At that ang
 is taken, the bent ray gains a phase of :math:`kL (1 - \cos(\theta^* - \theta))`, and the wave
 front, curved as from a nearer source, is stronger by
 
-.. math:: [(1 - P''/L)(1 - P'\cot\theta/L)]^{-1/2}.
+.. math:: \left[(1 - P''/L)(1 - P'/(L \tan\theta))\right]^{-1/2}.
 
 What is left out is of the order :math:`(d/L)^2`, and for the waves that run to and fro within the
 slab their further shift: a phase of :math:`k(2s)^2/2L` for those that do so once. Several slabs

@@ -22,7 +22,8 @@ def received(signals: Signals, scenario: Scenario, *, seed: int, sample: int) ->
     """Record the signals: ripple, phase noise, clock, thermal noise, dynamic range, in turn.
 
     A silent array gets the noise of the quietest other, or is left out where there is none:
-    noise relative to no signal has no level of its own, but all arrays share a receiver.
+    noise relative to no signal has no level of its own, but all arrays share a receiver. A noise
+    floor is the same for all arrays.
 
     Parameters
     ----------
@@ -90,6 +91,13 @@ def _noisy(signals: Signals, scenario: Scenario, *, seed: int, sample: int) -> S
             f"scenario {scenario.name!r}: no reflecting object and no user is seen by the array, "
             "so nothing is received; add an object or a user, or move what blocks them"
         )
+    floor = scenario.noise.floor
+    if floor is not None:  # the same receiver for all, also where nothing is heard
+        return {
+            name: values
+            + complex_noise(values.shape, floor, random_stream(seed, sample, f"noise/{name}"))
+            for name, values in signals.items()
+        }
     snr_db = scenario.noise.snr_db
     if np.isinf(snr_db):
         return {name: signals[name] for name in heard}

@@ -168,3 +168,37 @@ BAD = [
 def test_an_impairment_that_cannot_be_is_refused(impairments: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         scenario(impairments)
+
+
+def test_a_noise_floor_is_that_of_temperature_bandwidth_and_noise_figure() -> None:
+    floor = {"figure_db": 10.0, "bandwidth_hz": 1e6, "transmit_power_dbm": -30.0}
+    clean, noisy = (simulate(scenario(None, **noise), seed=0).measurement for noise in ({}, floor))
+    # -174 dBm/Hz (290 K) + 60 dB + 10 dB, over what is sent.
+    expected = 10 ** ((-173.975 + 60.0 + 10.0 + 30.0) / 10)
+    pairs = [(clean.echo, noisy.echo), *zip(clean.uplinks, noisy.uplinks, strict=True)]
+    for without, heard in pairs:
+        if without is None or heard is None:
+            raise AssertionError("an array is missing")
+        power = float(np.mean(np.abs(heard.samples - without.samples) ** 2))
+        # Of 12832 exponentials the mean's standard deviation is 0.9 %.
+        assert power == pytest.approx(expected, rel=4 / np.sqrt(heard.samples.size))
+
+
+@pytest.mark.parametrize(
+    ("noise", "message"),
+    [
+        (
+            {"figure_db": 8.0},
+            r"needs figure_db, bandwidth_hz and transmit_power_dbm; give bandwidth",
+        ),
+        (
+            {"figure_db": 8.0, "bandwidth_hz": 1e6, "transmit_power_dbm": 0.0, "snr_db": 20.0},
+            r"snr_db = 20.* exclude each other",
+        ),
+    ],
+)
+def test_half_a_noise_floor_or_two_noises_are_refused(
+    noise: dict[str, float], message: str
+) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        scenario(None, **noise)
