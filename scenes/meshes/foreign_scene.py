@@ -37,9 +37,10 @@ class Geometry(Checked):
 def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
     """Replace a scenario's table [geometry] by an object of kind 'mesh' for each of its shapes.
 
-    A material of the ITU-R P.2040 keeps its name and thickness unless told otherwise; for all
-    others the table says what they are. What was told about a shape goes before what was told
-    about its material.
+    A material of the ITU-R P.2040 keeps its name and thickness unless told otherwise, a radio
+    material its permittivity, conductivity and thickness; for all others the table says what they
+    are. A scattering coefficient is not taken over: an object's ``roughness`` says what scatters.
+    What was told about a shape goes before what was told about its material.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def _clashes(shapes: tuple[ForeignShape, ...], own: Mapping[str, object]) -> lis
 
 def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
     body: dict[str, object] = {
-        **_itu(shape.material),
+        **_made_of(shape.material),
         **geometry.materials.get(shape.material.name, {}),
         **geometry.objects.get(shape.name, {}),
         "kind": "mesh",
@@ -139,7 +140,16 @@ def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
     return body
 
 
-def _itu(material: ForeignMaterial) -> dict[str, object]:
+def _made_of(material: ForeignMaterial) -> dict[str, object]:
+    """Return what the file says of a material, as keys of an object."""
+    if material.slab is not None:
+        return {
+            "material": {
+                "permittivity": [material.slab.permittivity, 0.0],
+                "conductivity_s_m": material.slab.conductivity,
+                "thickness_mm": material.slab.thickness * 1e3,
+            }
+        }
     name = material.itu_type
     if name == "metal":
         return {"material": "metal"}

@@ -85,6 +85,13 @@ class Slab(Checked):
         Annotated[tuple[Real, Loss], Field(strict=False, json_schema_extra={"type": "array"})]
         | None
     ) = Field(None, description="[e', e''] of e' - j e'', constant over frequency")
+    conductivity_s_m: float | None = Field(
+        None,
+        ge=0,
+        le=1e9,
+        description="with a permittivity [e', 0]: the conductivity, whose loss falls with "
+        "frequency [S/m]",
+    )
     file: str | None = Field(
         None,
         min_length=1,
@@ -103,6 +110,15 @@ class Slab(Checked):
                 "has {given}; give exactly one of name, permittivity and file",
                 {"given": " and ".join(given) or "neither name nor permittivity nor file"},
             )
+        if self.conductivity_s_m is not None and (
+            self.permittivity is None or self.permittivity[1] != 0
+        ):
+            raise PydanticCustomError(
+                "slab",
+                "conductivity_s_m = {conductivity} stands for the loss of a permittivity; give "
+                "permittivity = [e', 0] with it, or leave it out",
+                {"conductivity": self.conductivity_s_m},
+            )
         if math.isnan(self.thickness_mm):
             raise PydanticCustomError("slab", "thickness_mm = nan; give a number, or inf")
         return self
@@ -116,6 +132,8 @@ class Slab(Checked):
         """Name it as a legend would."""
         if self.permittivity is not None:
             what = f"ε {self.permittivity[0]:g} − {self.permittivity[1]:g}j"
+            if self.conductivity_s_m is not None:
+                what = f"ε {self.permittivity[0]:g}, {self.conductivity_s_m:g} S/m"
         else:
             what = str(self.name or self.file)
         return f"{what}, {'opaque' if math.isinf(self.thickness) else f'{self.thickness_mm:g} mm'}"

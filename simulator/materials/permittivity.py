@@ -54,6 +54,18 @@ class PowerLawPermittivity:
     lowest: float  # [Hz]
     highest: float  # [Hz]
 
+    @classmethod
+    def of_conductivity(cls, real: float, conductivity: float) -> "PowerLawPermittivity":
+        """Make the permittivity of a constant conductivity [S/m], at any frequency."""
+        return cls(
+            name="a conductivity",
+            real=real,
+            factor=conductivity,
+            exponent=0.0,
+            lowest=0.0,
+            highest=np.inf,
+        )
+
     def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
         """Evaluate the power law, within the band it was fitted to."""
         _check_band(

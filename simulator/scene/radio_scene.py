@@ -28,6 +28,7 @@ from simulator.materials.permittivity import (
     ConstantPermittivity,
     MaterialError,
     Permittivity,
+    PowerLawPermittivity,
     read_permittivity,
 )
 from simulator.materials.slab_insertion import (
@@ -207,6 +208,8 @@ def _material(material: str | Slab, frequencies: Float[np.ndarray, " freqs"]) ->
     if material.permittivity is not None:
         real, loss = material.permittivity
         permittivity = ConstantPermittivity(value=complex(real, -loss))
+        if material.conductivity_s_m is not None:
+            permittivity = PowerLawPermittivity.of_conductivity(real, material.conductivity_s_m)
     else:
         permittivity = read_permittivity(Path(str(material.file)))
         permittivity(frequencies)  # refuses a band that it does not cover

@@ -4,10 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes.meshes import mitsuba_xml
-from scenes.meshes.mitsuba_xml import read_mitsuba_xml
+from scenes.meshes import mitsuba_elements, mitsuba_xml
+from scenes.meshes.mesh_file import placed_mesh
+from scenes.meshes.mitsuba_xml import RadioSlab, read_mitsuba_xml
 from scenes.meshes.ply_writer import ply_bytes
 from scenes.schema.errors import ScenarioError
+from scenes.schema.objects import MeshFile
 
 MATERIAL = '<bsdf type="diffuse" id="mat-paint"/>'
 SHAPE = (
@@ -90,6 +92,96 @@ def test_a_rotation_about_any_axis_keeps_lengths_and_the_axis(folder: Path) -> N
     assert np.trace(rotation) == pytest.approx(1 + 2 * math.cos(math.radians(77)))
 
 
+def test_to_look_at_a_point_turns_as_mitsuba_turns(folder: Path) -> None:
+    import mitsuba as mi
+
+    origin, target, up = [0.3, -0.5, 1.0], [2.0, 1.0, 0.4], [0.1, 0.2, 1.0]
+    step = " ".join(
+        f'{name}="{", ".join(map(str, values))}"'
+        for name, values in (("origin", origin), ("target", target), ("up", up))
+    )
+    look = f'<transform name="to_world"><lookat {step}/></transform>'
+    (found,) = read_mitsuba_xml(scene(folder, shape(more=look)))
+    expected = mi.ScalarTransform4f().look_at(origin=origin, target=target, up=up)
+    np.testing.assert_allclose(found.to_world, np.array(expected.matrix)[:3], atol=1e-6)
+
+
+def test_nine_numbers_are_a_linear_map(folder: Path) -> None:
+    nine = '<transform name="to_world"><matrix value="0 -2 0 2 0 0 0 0 3"/></transform>'
+    (found,) = read_mitsuba_xml(scene(folder, shape(more=nine)))
+    np.testing.assert_array_equal(found.to_world @ [1, 1, 1, 1], [-2, 2, 3])
+
+
+@pytest.mark.parametrize(("kind", "volume", "area"), [("cube", 8.0, 24.0), ("rectangle", 0.0, 4.0)])
+def test_a_shape_without_a_file_is_that_of_mitsuba(
+    folder: Path, kind: str, volume: float, area: float
+) -> None:
+    body = MATERIAL + f'<shape type="{kind}" id="it"><ref id="mat-paint"/></shape>'
+    (found,) = read_mitsuba_xml(scene(folder, body))
+    mesh = placed_mesh(
+        MeshFile.model_validate({"kind": "mesh", "file": str(found.file), "material": "metal"})
+    )
+    assert mesh.area == pytest.approx(area)
+    assert mesh.volume == pytest.approx(volume)
+    np.testing.assert_allclose(np.abs(mesh.vertices[:, :2]), 1.0)
+
+
+def test_before_version_two_parameters_were_written_in_camel_case(folder: Path) -> None:
+    old = '<transform name="toWorld"><scale value="2"/></transform>'
+    path = scene(folder, shape(more=old))
+    path.write_text(path.read_text().replace("3.0.0", "0.6.0"))
+    (found,) = read_mitsuba_xml(path)
+    np.testing.assert_array_equal(found.to_world, 2 * np.eye(4)[:3])
+
+
+def test_instances_put_a_group_in_several_places(folder: Path) -> None:
+    twice = '<transform name="to_world"><scale value="2"/></transform>'
+    group = (
+        '<shape type="shapegroup" id="g">' + SHAPE.format(file="wall.ply", more=twice) + "</shape>"
+    )
+    places = "".join(
+        f'<shape type="instance" id="i{x}"><ref id="g"/>'
+        f'<transform name="to_world"><translate x="{x}"/></transform></shape>'
+        for x in (1, 5)
+    )
+    found = read_mitsuba_xml(scene(folder, MATERIAL + group + places))
+    assert [one.name for one in found] == ["i1", "i5"]
+    for one, x in zip(found, (1, 5), strict=True):
+        np.testing.assert_array_equal(one.to_world @ [1, 0, 0, 1], [2 + x, 0, 0])
+        assert one.material.name == "paint"
+
+
+def test_lights_in_shapes_are_passed_over(folder: Path) -> None:
+    (found,) = read_mitsuba_xml(scene(folder, shape(more='<emitter type="area"/>')))
+    assert found.name == "wall"
+
+
+def test_meshes_are_looked_for_where_the_file_says(folder: Path) -> None:
+    (folder / "inner").mkdir()
+    (folder / "wall.ply").rename(folder / "inner" / "wall.ply")
+    (found,) = read_mitsuba_xml(scene(folder, '<path value="inner"/>' + shape()))
+    assert found.file == folder / "inner" / "wall.ply"
+
+
+def test_a_parameter_has_the_value_that_the_file_gives_it(folder: Path) -> None:
+    body = '<default name="file" value="wall.ply"/>' + shape("$file")
+    (found,) = read_mitsuba_xml(scene(folder, body))
+    assert found.file == folder / "wall.ply"
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+def test_a_radio_material_brings_its_numbers(folder: Path, two_sided: bool) -> None:
+    numbers = (
+        '<float name="relative_permittivity" value="2.5"/><float name="conductivity" value="0.02"/>'
+    )
+    material = f'<bsdf type="radio-material" id="mat-paint">{numbers}</bsdf>'
+    if two_sided:
+        inner = material.replace(' id="mat-paint"', "")
+        material = f'<bsdf type="twosided" id="mat-paint">{inner}</bsdf>'
+    (found,) = read_mitsuba_xml(scene(folder, material + SHAPE.format(file="wall.ply", more="")))
+    assert found.material.slab == RadioSlab(permittivity=2.5, conductivity=0.02, thickness=0.1)
+
+
 def test_names_become_keys_of_a_scenario(folder: Path) -> None:
     (found,) = read_mitsuba_xml(scene(folder, shape().replace("mesh-wall", "mesh-Cube.001")))
     assert found.name == "Cube_001"
@@ -132,18 +224,33 @@ def test_entities_are_not_expanded(folder: Path) -> None:
     ("body", "message"),
     [
         ('<include filename="other.xml"/>', "<include> is not allowed"),
-        ('<path value="/etc"/>', "<path> is not allowed"),
+        ('<path value="/etc"/>', "lies outside of the file's own folder"),
         ('<alias id="a" as="b"/>', "<alias> is not allowed"),
-        ('<shape type="rectangle"/>', "<shape type='rectangle'> is not known"),
+        ('<shape type="disk"/>', "<shape type='disk'> is not known"),
+        ('<shape type="instance"><ref id="g"/></shape>', "refers to the group 'g'"),
+        (
+            shape(more='<transform name="toWorld"><scale value="2"/></transform>'),
+            "since version 2.0.0 it is called 'to_world'",
+        ),
         ('<shape type="plyy"/>', "did you mean 'ply'?"),
         ('<bsdf type="my-plugin" id="m"/>', "<bsdf type='my-plugin'> is not known"),
         (shape(more='<bsdf type="evil"/>'), "<bsdf type='evil'> is not known"),
-        (shape(more='<emitter type="area"/>'), "<emitter> is not allowed in <shape>"),
+        (shape(more='<include filename="x"/>'), "<include> is not allowed in <shape>"),
         (shape().replace('id="mat-paint" name', 'id="mat-pain" name'), "did you mean 'mat-paint'?"),
         (shape() + SHAPE.format(file="wall.ply", more=""), "two shapes are called 'wall'"),
         (MATERIAL, "it holds no shape"),
         ('<shape type="ply"/>', "lacks its 'filename'"),
-        (shape(more='<transform name="to_world"><lookat/></transform>'), "<lookat> in a transform"),
+        (
+            shape(more='<transform name="to_world"><shear/></transform>'),
+            "<shear> in a transform",
+        ),
+        (
+            shape(
+                more='<transform name="to_world"><lookat origin="0 0 0" target="0 0 1" up="0 0 2"/>'
+                "</transform>"
+            ),
+            "looks along its 'up'",
+        ),
         (
             shape(more='<transform name="to_world"><rotate angle="5"/></transform>'),
             "a <rotate> has no axis",
@@ -180,6 +287,6 @@ def test_a_file_that_is_no_scene_is_refused(folder: Path, monkeypatch: pytest.Mo
     path.write_text("<scene>" + "<default>" * 40 + "</default>" * 40 + "</scene>")
     assert "nested deeper than 32" in refusal(path)
     monkeypatch.setattr(mitsuba_xml, "MOST_SHAPES", 0)
-    assert "1 shapes are more than 0" in refusal(scene(folder, shape()))
-    monkeypatch.setattr(mitsuba_xml, "LARGEST_FILE", 10)
+    assert "more than 0 shapes" in refusal(scene(folder, shape()))
+    monkeypatch.setattr(mitsuba_elements, "LARGEST_FILE", 10)
     assert "a file of 1 to 10 bytes is needed" in refusal(path)
