@@ -1,10 +1,13 @@
 """The table [geometry]: a foreign scene's meshes as objects, their materials given by name."""
 
+import functools
+import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from scenes.meshes.mitsuba_xml import ForeignMaterial, ForeignShape, read_mitsuba_xml
 from scenes.schema.errors import ScenarioError, did_you_mean, problems
@@ -17,8 +20,13 @@ _THE_FILES = ("kind", "file", "matrix", "facets")  # keys of an object that the 
 class Geometry(Checked):
     """A foreign scene's meshes; its materials and shapes are given what they are made of."""
 
-    file: str = Field(
-        min_length=1, description="the Mitsuba or Sionna XML file, relative to the scenario's"
+    file: str | None = Field(
+        None,
+        min_length=1,
+        description="the Mitsuba or Sionna XML file, relative to the scenario's",
+    )
+    sionna: str | None = Field(
+        None, min_length=1, description="instead of file: the name of a scene of Sionna RT's own"
     )
     facets: Literal["cut", "file"] = Field(
         "cut", description="'cut' its triangles until they are fine enough, or 'file': as they are"
@@ -32,6 +40,44 @@ class Geometry(Checked):
         default_factory=dict,
         description="by the name of a shape of the file: the same, for this shape alone",
     )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "Geometry":
+        if (self.file is None) == (self.sionna is None):
+            raise PydanticCustomError(
+                "geometry",
+                "has {given} file and sionna; give exactly one",
+                {"given": "neither" if self.file is None else "both"},
+            )
+        if self.sionna is not None and self.sionna not in sionna_scenes():
+            raise PydanticCustomError(
+                "geometry",
+                "sionna = {name}: no scene of Sionna RT{hint}; known: {known}",
+                {
+                    "name": repr(self.sionna),
+                    "hint": did_you_mean(self.sionna, sionna_scenes()),
+                    "known": ", ".join(sionna_scenes()),
+                },
+            )
+        return self
+
+    @property
+    def path(self) -> Path:
+        """The scene's XML file."""
+        return Path(self.file) if self.file is not None else sionna_scenes()[str(self.sionna)]
+
+
+@functools.cache
+def sionna_scenes() -> Mapping[str, Path]:
+    """Return the XML files of the scenes that Sionna RT ships, by name, without loading it."""
+    found = importlib.util.find_spec("sionna")
+    folders = () if found is None else found.submodule_search_locations or ()
+    return {
+        file.stem: file
+        for folder in folders
+        for file in sorted(Path(folder).glob("rt/scenes/*/*.xml"))
+        if file.stem == file.parent.name
+    }
 
 
 def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
@@ -66,9 +112,10 @@ def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
         )
         raise ScenarioError("\n".join(lines)) from None
     try:
-        shapes = read_mitsuba_xml(Path(geometry.file))
+        shapes = read_mitsuba_xml(geometry.path)
     except ScenarioError as error:
-        raise ScenarioError(f"geometry.file: {error}") from None
+        key = "file" if geometry.file is not None else "sionna"
+        raise ScenarioError(f"geometry.{key}: {error}") from None
     own = plain.get("objects", {})
     if not isinstance(own, Mapping):  # the scenario's own check says so
         return plain
@@ -103,7 +150,7 @@ def _unknown(geometry: Geometry, shapes: tuple[ForeignShape, ...]) -> list[str]:
             if name not in known:
                 listed = ", ".join(dict.fromkeys(word for word in known if word)) or "none"
                 found.append(
-                    f"{place}: no such name in {geometry.file!r}{did_you_mean(name, known)}; "
+                    f"{place}: no such name in {str(geometry.path)!r}{did_you_mean(name, known)}; "
                     f"known: {listed}"
                 )
             found += [

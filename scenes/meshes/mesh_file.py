@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from scenes.meshes.mesh_formats import READERS, read_mesh
+from scenes.meshes.orientation import oriented, solid_angles
 from scenes.meshes.triangle_mesh import TriangleMesh, cleaned, distances_to_triangles
 from scenes.schema.errors import ScenarioError
 from scenes.schema.objects import MeshFile
@@ -17,14 +18,12 @@ FORMATS = tuple(f".{kind}" for kind in READERS)
 LARGEST_FILE = 2 * 2**30
 """Largest mesh file that is read [byte]."""
 
-_CHUNK = 2_000_000
-"""Pairs of point and triangle held at once: some 200 MB of solid angles."""
-
 
 def placed_mesh(body: MeshFile) -> TriangleMesh:
     """Read a mesh file, scale it, turn it about z, and move its origin to the centre.
 
-    The triangles of a watertight mesh are wound so that their normals point outward.
+    Each closed part of it is wound so that its normals point outward, each cavity within a part
+    so that they point into it.
 
     Raises
     ------
@@ -66,7 +65,8 @@ def _placed(body: MeshFile, changed: int, size: int) -> TriangleMesh:
     if np.abs(vertices).max() > FARTHEST:
         raise ScenarioError(
             f"mesh file {body.file!r}: vertices must lie within {FARTHEST:g} m after "
-            f"scaling by {body.scale:g}; set 'scale' to metres per unit of the file"
+            f"scaling by {body.scale:g}; set 'scale' to metres per unit of the file (0.001 for "
+            "millimetres)"
         )
     mesh = TriangleMesh(vertices=vertices, faces=read.faces)
     if not mesh.areas.min() > 0:
@@ -80,15 +80,7 @@ def _placed(body: MeshFile, changed: int, size: int) -> TriangleMesh:
             "two triangles, and solid = true needs a watertight mesh; close its holes and export "
             "it again, or set solid = false (a sheet, seen from both sides)"
         )
-    if mesh.is_watertight:
-        if not mesh.is_wound_one_way:
-            raise ScenarioError(
-                f"mesh file {body.file!r}: it is closed, but its triangles are wound both ways; "
-                "recalculate its normals outward and export it again"
-            )
-        if mesh.volume < 0:
-            mesh = mesh.turned_inside_out()
-    return mesh
+    return oriented(mesh)
 
 
 def _read(file: str) -> TriangleMesh:
@@ -144,16 +136,7 @@ def _inside(body: MeshFile, points: Float[np.ndarray, "points 3"]) -> Bool[np.nd
         return inside
     low, high = mesh.bounds
     candidates = np.flatnonzero(((points >= low) & (points <= high)).all(axis=-1))
-    triangles = mesh.triangles
-    chunk = max(1, _CHUNK // len(triangles))
-    for first in range(0, len(candidates), chunk):
-        some = candidates[first : first + chunk]
-        a, b, c = np.moveaxis(triangles[None] - points[some, None, None, :], 2, 0)
-        la, lb, lc = (np.linalg.norm(edge, axis=-1) for edge in (a, b, c))
-        volume = np.einsum("pfx,pfx->pf", a, np.cross(b, c))
-        cosines = la * lb * lc
-        for one, other, length in ((a, b, lc), (b, c, la), (c, a, lb)):
-            cosines += np.einsum("pfx,pfx->pf", one, other) * length
-        angle = 2 * np.arctan2(volume, cosines).sum(axis=-1)
-        inside[some] = angle > 2 * np.pi
+    if candidates.size:
+        angles = solid_angles(mesh.triangles, points[candidates])
+        inside[candidates] = angles > 2 * np.pi
     return inside

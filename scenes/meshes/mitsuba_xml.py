@@ -25,7 +25,7 @@ from scenes.meshes.mitsuba_transforms import transform
 from scenes.schema.errors import did_you_mean, shown_text
 from scenes.schema.quantities import FORBIDDEN_IN_NAMES
 
-MOST_SHAPES = 2000
+MOST_SHAPES = 10_000
 """Most shapes of a foreign scene, each instance for itself: each becomes an object."""
 
 FORMATS = ("ply", "obj")

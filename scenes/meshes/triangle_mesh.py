@@ -66,21 +66,17 @@ class TriangleMesh:
         return int(np.count_nonzero(counts != 2))
 
     @cached_property
-    def is_wound_one_way(self) -> bool:
-        """Whether two triangles that share an edge run along it in opposite ways."""
-        order, counts, forward = self._edges
-        pairs = _pairs(order, counts)
-        return bool(np.all(forward[pairs[:, 0]] != forward[pairs[:, 1]]))
-
-    @cached_property
     def neighbours(self) -> Int[np.ndarray, "pairs 2"]:
         """Pairs of triangles that share an edge which belongs to no third one."""
         order, counts, _ = self._edges
         return _pairs(order, counts) // 3
 
-    def turned_inside_out(self) -> "TriangleMesh":
-        """Return the mesh with its normals the other way."""
-        return TriangleMesh(vertices=self.vertices, faces=np.ascontiguousarray(self.faces[:, ::-1]))
+    @cached_property
+    def against(self) -> Bool[np.ndarray, " pairs"]:
+        """Which neighbours run along the edge they share in the same way: one is turned."""
+        order, counts, forward = self._edges
+        pairs = _pairs(order, counts)
+        return np.asarray(forward[pairs[:, 0]] == forward[pairs[:, 1]])
 
     @cached_property
     def _crosses(self) -> Float[np.ndarray, "faces 3"]:

@@ -3,14 +3,16 @@
 import numpy as np
 from jaxtyping import Float
 
+from scenes.meshes.triangle_mesh import TriangleMesh
 from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from simulator.geometry.flat_faces import flat_faces
 from simulator.geometry.mirrors import Mirrors, line_mirrors
 from simulator.materials.fresnel_slab import Absorber, Conductor, Material
 
 MOST_FACES = 64
-"""A mesh of more faces counts as curved, and is no mirror: chains grow as a power of them."""
+"""A mesh of more flat faces counts as curved, and is no mirror: chains grow as a power of them."""
 
 _SAME_PLANE = 1e-9  # how far apart the two triangles of a rectangle lie at most [m]
 _SAME_NORMAL = 1e-12  # 1 - cosine of their normals at most: 1.4 µrad, and rounding is 1e-16 [-]
@@ -52,10 +54,14 @@ def mean_mirrors(
     corners, made, rough, two_sided = [np.empty((0, 4, 3))], [], [], []
     for surface in surfaces:
         body, material = scenario.objects[surface.name], materials[surface.name]
-        curved = isinstance(body, MeshFile) and len(surface.cells) > MOST_FACES
-        if curved or isinstance(body, Cylinder) or isinstance(material, Absorber):
+        if isinstance(body, Cylinder) or isinstance(material, Absorber):
             continue
-        flat = _flat_mirrors(surface)
+        if isinstance(body, MeshFile) and surface.cells.shape[1] == 3:
+            flat = flat_faces(TriangleMesh(vertices=surface.vertices, faces=surface.cells))
+        else:
+            flat = _flat_mirrors(surface)
+        if isinstance(body, MeshFile) and len(flat) > MOST_FACES:
+            continue
         if isinstance(body, Plate | Box) and surface.cells.shape[1] == 3:
             flat = _quadrilaterals(flat)
         corners.append(flat)

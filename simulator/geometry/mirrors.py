@@ -29,6 +29,13 @@ def dot(
     return product
 
 
+SEAM = 1e-8
+"""How far a point is moved before it is asked which mirror it is on: far beyond rounding, far
+below a wavelength. [m]"""
+
+ASIDE = np.array([0.8, 0.5, 0.33])
+"""Where to: a direction that no edge of a scene is likely to run along."""
+
 LEAST_AREA = 1e-10
 """Smallest area of a mirror, that of a square of 10 µm. [m²]"""
 
@@ -122,6 +129,16 @@ class Mirrors:
         distances = np.where(np.any(self.inward[mirror] != 0.0, axis=-1), distances, np.inf)
         margin: np.ndarray = distances.min(axis=-1)
         return margin
+
+    def reflects_at(self, points: Float[np.ndarray, "*n 3"], mirror: int) -> Bool[np.ndarray, "*n"]:
+        """Tell which points of its plane are on a mirror.
+
+        Where two mirrors of one plane share an edge, each point of it is on one of them: moved
+        by :data:`SEAM` in one and the same direction, it lies clearly on either side.
+        """
+        normal = self.normals[mirror]
+        step = SEAM * (ASIDE - float(ASIDE @ normal) * normal)
+        return np.asarray(self.margins(points + step, mirror) >= 0.0)
 
 
 def line_mirrors(

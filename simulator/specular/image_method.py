@@ -325,7 +325,7 @@ def _unfold(
         kept, points, image = kept[apart], points[apart], image[apart]
         fraction = here[apart] / (here[apart] - behind[apart])
         hits = points + fraction[:, None] * (image - points)
-        inside = mirrors.margins(hits, mirror) >= 0.0
+        inside = mirrors.reflects_at(hits, mirror)
         kept, points = kept[inside], hits[inside]
         vertices = vertices[apart][inside]
         vertices[:, bounce] = points

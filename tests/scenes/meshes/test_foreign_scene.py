@@ -96,6 +96,36 @@ def test_a_rough_foreign_face_is_as_rough_as_asked(tmp_path: Path) -> None:
     assert heights.std() == pytest.approx(0.1e-3, rel=4 / np.sqrt(2 * 300))
 
 
+def test_a_scene_of_sionnas_is_found_by_its_name() -> None:
+    station = STATION | {"position_m": [0.0, 0.0, 2.0]}
+    inside = {"box": {"hollow": True}}
+    named = scenario({"sionna": "box_one_screen", "objects": inside}, base_station=station)
+    filed = scenario({"file": rt.scene.box_one_screen, "objects": inside}, base_station=station)
+    assert named == filed
+
+
+def test_a_name_that_no_scene_has_is_refused_with_those_known() -> None:
+    with pytest.raises(ScenarioError, match=r"no scene of Sionna RT; did you mean 'box'\?") as error:
+        scenario({"sionna": "boxx"})
+    assert "munich" in str(error.value)
+    with pytest.raises(ScenarioError, match="has both file and sionna; give exactly one"):
+        scenario({"sionna": "box", "file": "box.xml"})
+
+
+def test_a_radio_material_of_a_file_is_a_slab_that_conducts(tmp_path: Path) -> None:
+    plate = np.array([[-0.1, 0.5, -0.1], [0.1, 0.5, -0.1], [0.1, 0.5, 0.1], [-0.1, 0.5, 0.1]])
+    (tmp_path / "plate.ply").write_bytes(ply_bytes(plate, np.array([[0, 1, 2], [0, 2, 3]])))
+    path = tmp_path / "scene.xml"
+    path.write_text(
+        '<scene version="3.0.0"><bsdf type="radio-material" id="soil"><float '
+        'name="relative_permittivity" value="2.1"/><float name="conductivity" value="0.01"/>'
+        '<float name="thickness" value="0.05"/></bsdf><shape type="ply" id="wall"><string '
+        'name="filename" value="plate.ply"/><ref id="soil"/></shape></scene>'
+    )
+    made = scenario({"file": str(path)}).objects["wall"].material
+    assert made == Slab(permittivity=(2.1, 0.0), conductivity_s_m=0.01, thickness_mm=50.0)
+
+
 def test_sionnas_own_scene_is_a_scenario() -> None:
     station = STATION | {"position_m": [0.0, 0.0, 2.0]}
     geometry = {"file": rt.scene.box_two_screens}

@@ -110,3 +110,10 @@ def test_frequencies_of_a_table_have_to_rise() -> None:
 def test_a_loss_tangent_of_one_is_the_conductivity_of_the_displacement_current() -> None:
     sigma = permittivity.conductivity(np.array([3.0 - 3.0j]), np.array([1e9]))
     assert sigma[0] == pytest.approx(2 * np.pi * 1e9 * epsilon_0 * 3, rel=1e-15)
+
+
+def test_a_conductivity_is_the_loss_of_its_displacement_current() -> None:
+    frequencies = np.array([1e9, 28e9, 300e9])
+    made = PowerLawPermittivity.of_conductivity(2.1, 0.01)(frequencies)
+    np.testing.assert_allclose(made.real, 2.1)
+    np.testing.assert_allclose(conductivity(made, frequencies), 0.01, rtol=1e-12)
