@@ -8,6 +8,7 @@ from simulator.materials import permittivity
 from simulator.materials.permittivity import (
     ConstantPermittivity,
     MaterialError,
+    PowerLawPermittivity,
     TabulatedPermittivity,
 )
 
@@ -116,4 +117,4 @@ def test_a_conductivity_is_the_loss_of_its_displacement_current() -> None:
     frequencies = np.array([1e9, 28e9, 300e9])
     made = PowerLawPermittivity.of_conductivity(2.1, 0.01)(frequencies)
     np.testing.assert_allclose(made.real, 2.1)
-    np.testing.assert_allclose(conductivity(made, frequencies), 0.01, rtol=1e-12)
+    np.testing.assert_allclose(permittivity.conductivity(made, frequencies), 0.01, rtol=1e-12)
