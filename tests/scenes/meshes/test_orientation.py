@@ -10,12 +10,14 @@ from scenes.meshes.triangle_mesh import TriangleMesh, cleaned
 
 
 def joined(*parts: trimesh.Trimesh) -> TriangleMesh:
-    whole = trimesh.util.concatenate(parts)
-    return cleaned(np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces))
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([np.asarray(part.vertices, dtype=float) for part in parts])
+    faces = [start + np.asarray(part.faces) for start, part in zip(first, parts, strict=False)]
+    return cleaned(vertices, np.concatenate(faces))
 
 
 def box(side: float, *, at: float = 0.0, inside_out: bool = False) -> trimesh.Trimesh:
-    made = trimesh.creation.box((side, side, side))
+    made: trimesh.Trimesh = trimesh.creation.box((side, side, side))
     made.apply_translation((at, 0.0, 0.0))
     if inside_out:
         made.invert()
