@@ -41,6 +41,11 @@ class Wave(Protocol):
         ...
 
     @property
+    def gain(self) -> complex:
+        """S-parameter of the path. [-]."""
+        ...
+
+    @property
     def curvature(self) -> float:
         """Of the wavefront at the array's centre. [1/m]."""
         ...
@@ -96,6 +101,8 @@ class PathSet:
     free_covariance: Float[np.ndarray, "free free"]
     """Of (bearing, path length, curvature) of each wave with a curvature of its own."""
     how: Bearing = LINEAR  # what the array measures of a direction
+    frequency: float | None = None  # centre of the band, if levels are to count [Hz]
+    power: float | None = None  # of the pilot, less the noise: mean square of S-parameters [-]
 
     @property
     def observed(self) -> Float[np.ndarray, "paths kinds"]:

@@ -117,6 +117,8 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
         covariance=covariance,
         free_covariance=by_radius * np.outer(slopes, slopes),
         how=LINEAR,
+        frequency=float(uplink.frequencies.mean()),
+        power=energy / uplink.samples.size,
     )
 
 

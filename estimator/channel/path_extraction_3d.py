@@ -101,6 +101,8 @@ def find_space_paths(
         covariance=block_diag(nothing, *(path.wave.covariance for path in paths)),
         free_covariance=block_diag(nothing, *(path.free.covariance for path in paths)),
         how=PLANAR,
+        frequency=float(uplink.frequencies.mean()),
+        power=energy / uplink.samples.size,
     )
 
 

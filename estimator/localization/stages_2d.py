@@ -15,6 +15,7 @@ from estimator.channel.angle_range_map_2d import (
     default_path_lengths,
 )
 from estimator.channel.path_extraction_2d import find_paths
+from estimator.imaging.look_aside_2d import peaks_aside
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes
 from estimator.localization.close_range import close_scene
@@ -59,7 +60,13 @@ class LinearRoom:
             reach=echo_reach(self.echo)[1],
             widest=imaged_sine(self.echo),
             contrast=self.map.survey.contrast,
+            aside=self._aside,
         )
+
+    def _aside(
+        self, heading: Float[np.ndarray, " 3"], farthest: float
+    ) -> Float[np.ndarray, "peaks 3"] | None:
+        return peaks_aside(self.echo, self.map.survey, heading, farthest)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -2,12 +2,13 @@
 
 Every path may come over the mirrors that its ray meets, or over others that it only just misses.
 Each choice of paths and chains of mirrors is one hypothesis; those whose joint least squares
-leave no more over than their covariances allow are consistent. The one that explains most energy
-is the answer, paths that it does not explain are dropped, and it is ambiguous if another
-consistent one explains nearly as much elsewhere.
+leave no more over than their covariances allow are consistent.
+:mod:`estimator.positioning.posterior` weighs them, and that the truth is none of them. A place that
+holds 0.999 of the posterior is the answer, paths that it does not explain are dropped; else it is
+ambiguous, and all places are told with their probabilities.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -22,17 +23,37 @@ from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.specular_chains import Chain
-from estimator.positioning.los_check import check_line_of_sight
+from estimator.positioning.los_check import StraightWay, look_along, look_along_legs
 from estimator.positioning.map_context import MapContext
+from estimator.positioning.posterior import (
+    CERTAIN,
+    chain_probabilities,
+    log_weight,
+    strong_unexplained,
+    unseen_odds,
+)
 from estimator.positioning.weighted_least_squares import Consensus, Sighting, solve_position
 from estimator.results.estimate import PathReport, UserEstimate
 
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
+Chains = dict[int, tuple[Chain, ...]]
+"""For each path the chains of mirrors it may come over, the one that its ray meets first."""
+
 END_DEVIATIONS = 3.0
 """Deviations of the angle, beside the image's cell, by which a ray may meet another wall. [-]."""
 SAME = 1 - false_alarm.DISAGREEMENT
 """Probability with which two estimates of one position pass for the same. [-]"""
+NEGLIGIBLE = 1e-5
+"""Probability of a place below which it is not named. [-]"""
+UNSEEN_SOMEWHERE = (
+    "the path is weaker than a direct one, or comes from where little is shown: a wall that the "
+    "image does not show may have reflected it"
+)
+UNSEEN_BEYOND = (
+    "beyond the wall the path passes between two points that may be the ends of another wall, too "
+    "smooth to be seen"
+)
 SHARP = 10.0
 """A position known this many times better than the distance of its alternative cannot have
 been hit by chance: two paths agree there. [-]."""
@@ -83,34 +104,95 @@ def _on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
             reason=_why_none(strongest, found.how),
             paths=_reports(found, (), {}),
         )
-    chains = {
-        index: _chains(found.paths[index].wave.path_length, found.paths[index], room, found.how)
+    chances = {
+        index: chain_probabilities(
+            found.paths[index].wave.path_length,
+            found.paths[index],
+            room,
+            found,
+            _reach(found.paths[index], room),
+        )
         for index in specular
     }
+    chains = {index: _ordered(some) for index, some in chances.items()}
     consistent = _consistent(chains, found, room)
-    best = _most_explained(consistent, found, chains)
-    answer = _placed(name, best, found, room, chains)
-    rivals = _rivals(best, consistent, found, chains, room)
-    if rivals:
-        return _ambiguous(
-            answer,
-            "paths of like strength end at different places",
-            [_placed(name, rival, found, room, chains) for rival in rivals],
-        )
-    others = _other_chains(best, consistent, found.how)
-    if others:
+    return _decided(name, consistent, found, room, chains, chances)
+
+
+def _decided(
+    name: str,
+    consistent: Sequence[Consensus],
+    found: PathSet,
+    room: MapContext,
+    chains: Chains,
+    chances: Mapping[int, Mapping[Chain, float]],
+) -> UserEstimate:
+    """Answer by the posterior over all explanations, and that it is none of them."""
+    logs = [log_weight(one, found, room, chances) for one in consistent]
+    ways: dict[int, StraightWay] = {}
+    odds = []
+    for number, one in enumerate(consistent):
+        odds.append(0.0)
+        if len(one.sightings) > 1 or logs[number] < max(logs) + np.log(NEGLIGIBLE):
+            continue
+        alone = _placed(name, one, found, room, chains)
+        (only,) = one.sightings
+        if only.chain:
+            assert alone.path is not None
+            sight = look_along_legs(alone.path, room, found.how)
+            way = StraightWay(sight=sight, doubt=None if sight == "clear" else UNSEEN_BEYOND)
+        else:
+            way = look_along(alone, found.paths[only.path].wave, room, found.how)
+        ways[number] = way
+        odds[-1] = unseen_odds(one, found, room, way.sight)
+    weights = np.exp(np.array(logs) - max(logs))
+    total = float((weights * (1 + np.array(odds))).sum())
+    places = _places(consistent, weights / total, found.how)
+    best, probability = places[0]
+    answer = replace(_placed(name, consistent[best], found, room, chains), probability=probability)
+    if probability >= CERTAIN:
+        return answer
+    others = [
+        replace(_placed(name, consistent[index], found, room, chains), probability=share)
+        for index, share in places[1:]
+        if share > NEGLIGIBLE
+    ]
+    unseen = float(weights[best] * odds[best] / total)
+    elsewhere = ways[best].otherwise if best in ways else None
+    if elsewhere is not None and unseen > NEGLIGIBLE:
+        others.append(replace(elsewhere, probability=unseen))
+    contradicted = strong_unexplained(consistent[best], found, room)
+    elsewhere_too = sum(share for _, share in places[1:])
+    if best in ways and unseen >= elsewhere_too and not contradicted:
+        doubt = ways[best].doubt or UNSEEN_SOMEWHERE
+        return replace(_ambiguous(answer, doubt, others), line_of_sight=None)
+    paths = {one.path for one in consistent[best].sightings}
+    same = all(
+        {one.path for one in consistent[index].sightings} <= paths
+        for index, share in places[1:]
+        if share > NEGLIGIBLE
+    )
+    reason = "paths of like strength end at different places"
+    if same and len(paths) > 1:
+        reason = "the same paths agree over other walls as well"
+    elif same and not contradicted:
         reason = "the path meets a wall at its very end: it may pass beside it"
-        if len(best.sightings) > 1:
-            reason = "the same paths agree over other walls as well"
-        return _ambiguous(
-            answer, reason, [_placed(name, other, found, room, chains) for other in others]
-        )
-    if len(best.sightings) > 1:
-        return answer
-    (only,) = best.sightings
-    if only.chain:
-        return answer
-    return check_line_of_sight(answer, found.paths[only.path].wave, room, found.how)
+    return _ambiguous(answer, reason, others)
+
+
+def _places(
+    consistent: Sequence[Consensus], shares: Float[np.ndarray, " weights"], how: Bearing
+) -> list[tuple[int, float]]:
+    """Put explanations of one place together: the likeliest of each, and their probability."""
+    places: list[tuple[int, float]] = []
+    for index in np.argsort(-shares, kind="stable"):
+        for number, (first, share) in enumerate(places):
+            if _same_place(consistent[first], consistent[index], how):
+                places[number] = (first, share + float(shares[index]))
+                break
+        else:
+            places.append((int(index), float(shares[index])))
+    return sorted(places, key=lambda place: -place[1])
 
 
 def _on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
@@ -169,20 +251,24 @@ def _why_none(path: Path, how: Bearing) -> str:
     )
 
 
-Chains = dict[int, tuple[Chain, ...]]
-"""For each path the chains of mirrors it may come over, the one that its ray meets first."""
-
-
 def _chains(length: float, path: Path, room: MapContext, how: Bearing) -> tuple[Chain, ...]:
     bearing = path.wave.bearing
-    reach = room.resolution.across_ray
-    variance = path.wave.covariance[: bearing.size, : bearing.size].trace()
-    reach += END_DEVIATIONS * float(np.sqrt(variance))
     met = [
         trace(how.towards(turned), length, room.walls)[1]
-        for turned in (bearing, *how.around(bearing, reach))
+        for turned in (bearing, *how.around(bearing, _reach(path, room)))
     ]
     return tuple(dict.fromkeys(met))
+
+
+def _reach(path: Path, room: MapContext) -> float:
+    """Angle by which a path's ray may be off a wall's end. [rad]."""
+    size = path.wave.bearing.size
+    variance = float(path.wave.covariance[:size, :size].trace())
+    return room.resolution.across_ray + END_DEVIATIONS * float(np.sqrt(variance))
+
+
+def _ordered(chances: Mapping[Chain, float]) -> tuple[Chain, ...]:
+    return tuple(sorted(chances, key=lambda chain: -chances[chain]))
 
 
 def _consistent(

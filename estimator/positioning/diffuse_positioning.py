@@ -56,6 +56,9 @@ it in 1 of 60 points (ln 2 · 6 = 4.2 times their mean)."""
 FEWEST_LIT = 0.5
 """Share of some wall's points that must be lit: a mirror-like path lights a few only. [-]"""
 
+PARALLEL = float(np.cos(np.radians(10.0)))
+"""Cosine between the normals of walls that count as parallel. [-]"""
+
 STRETCHES = 12
 """Stretches of a wall whose distances are told apart."""
 
@@ -83,6 +86,7 @@ class DiffuseFix:
     covariance: Float[np.ndarray, "3 3"]  # [m²]
     wall: int  # index of the wall that scatters most
     lit: float  # share of its points that are lit [-]
+    several: bool  # whether two walls or more, that are not parallel, scatter from there
     rivals: Float[np.ndarray, "rivals 3"]  # other places that explain the pilot as well [m]
 
 
@@ -146,7 +150,20 @@ def search_diffuse(uplink: Uplink, walls: Sequence[SeenWall]) -> DiffuseFix | No
         covariance=full,
         wall=wall,
         lit=shares[wall],
+        several=_several(walls, wall, shares),
         rivals=_rivals(anchors, cells, scores, place, covariance),
+    )
+
+
+def _several(walls: Sequence[SeenWall], brightest: int, shares: Sequence[float]) -> bool:
+    """Tell whether another wall, not parallel to the brightest, scatters from most of its length.
+
+    Parallel ones tell the same distances, and share the mirror images.
+    """
+    normal = walls[brightest].true.normal
+    return any(
+        share >= FEWEST_LIT and abs(float(normal @ wall.true.normal)) < PARALLEL
+        for wall, share in zip(walls, shares, strict=True)
     )
 
 

@@ -5,7 +5,9 @@ short one shows as a few peaks without a direction; in an echo that is nearly al
 shows. The user's pilot alone cannot distinguish the user from its image in such a mirror.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +18,7 @@ from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.positioning.map_context import MapContext
+from estimator.positioning.posterior import Sight
 from estimator.positioning.unseen_mirrors import wall_between
 from estimator.results.estimate import UserEstimate
 
@@ -26,6 +29,9 @@ BESIDE = 2.0
 (:data:`estimator.walls.line_relations.BESIDE`). [cells]"""
 USER_SIZE = 0.05
 """Distance before the end of a path within which the user's own body may echo. [m]"""
+LONGEST_UNSEEN = 0.5
+"""Distance of two loose points beyond which they are not taken for the ends of one mirror on a leg
+that the array does not look along. [m]"""
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
@@ -33,10 +39,17 @@ was found in all images with more than 85, in some of those with 40 to 85 and in
 rest is margin for walls that are farther or smoother. [-]"""
 
 
-def check_line_of_sight(
-    answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing
-) -> UserEstimate:
-    """Doubt a direct path on which something may stand that the image does not show as a wall.
+@dataclass(frozen=True, kw_only=True)
+class StraightWay:
+    """What the image shows on the straight way of a path that seems direct."""
+
+    sight: Sight
+    doubt: str | None  # why something may be on it, for a person to read; None if it is clear
+    otherwise: UserEstimate | None = None  # where the user is over a mirror between two points
+
+
+def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing) -> StraightWay:
+    """Look for mirrors on the straight way that the map does not show.
 
     Parameters
     ----------
@@ -48,19 +61,15 @@ def check_line_of_sight(
         What the image shows.
     how
         What the array measures of a direction.
-
-    Returns
-    -------
-    The answer, or that it is ambiguous and why, with the place over an unseen wall.
     """
     heading, length = how.towards(wave.bearing), wave.path_length
-    shown = room.shows(heading)
+    shown, sight = room.shows(heading), cast(Sight, "clear")
     peaks = [room.unassigned_peaks]
     if not shown and room.aside is not None:
         # An image beyond the angles without grating lobes has more in it than there is, not less.
         aside = room.aside(heading, length)
         if aside is not None:
-            peaks, shown = [aside, *peaks], True
+            peaks, shown, sight = [aside, *peaks], True, "clear aside"
     loose = np.concatenate([some[:LOOSE_PEAKS] for some in peaks])
     mirror = unseen_mirror(heading, length, loose, room.resolution, how)
     if mirror is not None:
@@ -74,38 +83,61 @@ def check_line_of_sight(
             path=place.path,
             line_of_sight=False,
         )
-        return _doubted(
-            answer,
-            "the straight way passes between two points that may be the ends of a wall too smooth "
-            "to be seen; over such a wall the user is elsewhere",
-            other,
+        return StraightWay(
+            sight="between ends",
+            doubt="the straight way passes between two points that may be the ends of a wall too "
+            "smooth to be seen; over such a wall the user is elsewhere",
+            otherwise=other,
         )
     thing = what_stands_in_the_way(
         heading, length, np.concatenate(peaks), room.resolution.across_ray
     )
     if thing is not None:
         where = ", ".join(f"{thing[axis]:.3f}" for axis in how.coordinates)
-        return _doubted(
-            answer,
-            f"something stands on the straight way at ({where}) m: "
+        return StraightWay(
+            sight="something on it",
+            doubt=f"something stands on the straight way at ({where}) m: "
             "if it is a mirror too short to be told as one, the user is elsewhere",
         )
     if room.imaged and not room.walls and hides_walls(room.contrast):
-        return _doubted(answer, too_noisy(room.contrast))
+        return StraightWay(sight="not shown", doubt=too_noisy(room.contrast))
     if length > room.reach:
-        return _doubted(
-            answer,
-            f"the straight way is {length:.2f} m long, and the image shows what "
+        return StraightWay(
+            sight="not shown",
+            doubt=f"the straight way is {length:.2f} m long, and the image shows what "
             f"stands on it to {room.reach:.2f} m only; take smaller frequency steps",
         )
     if not shown:
-        return _doubted(
-            answer,
-            f"the image does not show what stands on the straight way at "
+        return StraightWay(
+            sight="not shown",
+            doubt=f"the image does not show what stands on the straight way at "
             f"{how.told(wave.bearing)}, but only what is within "
             f"{np.degrees(np.arcsin(room.widest)):.1f}° of boresight",
         )
-    return answer
+    return StraightWay(sight=sight, doubt=None)
+
+
+def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how: Bearing) -> Sight:
+    """Look for mirrors between two loose points on the legs of a path beyond its first mirror.
+
+    Parameters
+    ----------
+    path
+        Array, bounces, user. [m]
+    room, how
+        As in :func:`look_along`.
+    """
+    points = room.unassigned_peaks[:LOOSE_PEAKS]
+    for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
+        wall = wall_between(points[first], points[second], room.resolution, how)
+        if wall is None or np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:
+            continue
+        for start, end in pairwise(path[1:]):
+            far = float(np.linalg.norm(end - start))
+            hit = wall.hit(start, (end - start) / far)
+            if hit is not None and USER_SIZE < hit[0] < far - USER_SIZE:
+                return "between ends"
+    return "clear"
 
 
 def hides_walls(contrast: float) -> bool:
@@ -125,12 +157,6 @@ def too_noisy(contrast: float) -> str:
         f"the brightest point of the echo's image is {10 * np.log10(max(contrast, 1.0)):.0f} dB "
         f"above its noise, and below {10 * np.log10(LEAST_IMAGE_CONTRAST):.0f} dB walls may not "
         "show: over one the user is elsewhere; measure with less noise, or average more"
-    )
-
-
-def _doubted(answer: UserEstimate, reason: str, *others: UserEstimate) -> UserEstimate:
-    return replace(
-        answer, status="ambiguous", reason=reason, alternatives=others, line_of_sight=None
     )
 
 

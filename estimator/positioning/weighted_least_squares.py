@@ -54,6 +54,9 @@ class Consensus:
     covariance: Float[np.ndarray, "3 3"]  # [m²]
     chi_square: float  # weighted square of what is left over [-]
     freedom: int  # observations beyond the unknowns
+    log_evidence: float
+    """Logarithm of the density of what was observed, integrated over all places: of a Gaussian,
+    with a prior of 1 for each metre of each coordinate, about the least squares solution."""
     clock_offset: float | None  # of the user; None where it was not solved for [s]
     clock_deviation: float | None  # [s]
 
@@ -134,6 +137,13 @@ def solve_position(
         covariance=square,
         chi_square=float(rest @ rest),
         freedom=len(values) - len(unknowns),
+        log_evidence=float(
+            -0.5 * (rest @ rest)
+            - 0.5 * (len(values) - len(unknowns)) * np.log(2 * np.pi)
+            - np.log(np.diag(root)).sum()
+            - np.log(scale).sum()
+            + 0.5 * np.linalg.slogdet(spread)[1]
+        ),
         clock_offset=None if clock_known else float(unknowns[-1]) / speed_of_light,
         clock_deviation=None if clock_known else float(np.sqrt(spread[-1, -1])) / speed_of_light,
     )

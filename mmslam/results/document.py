@@ -121,6 +121,8 @@ def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:
         "name": user.name,
         "status": user.status,
         "reason": user.reason,
+        # That the user is there, given map, paths and priors; null where it was not worked out.
+        "probability": user.probability,
         "estimate_m": user.position,
         "covariance_m2": user.covariance,
         "line_of_sight": user.line_of_sight,

@@ -59,6 +59,8 @@ def _user(user: Mapping[str, Any]) -> str:
         line += f", angle {user['aoa_deg']:.3f}°, path {user['range_m']:.4f} m"
     if user["bounces"] is not None:
         line += f", {user['bounces']} bounce{'' if user['bounces'] == 1 else 's'}"
+    if user.get("probability") is not None:
+        line += f", probability {user['probability']:.4f}"
     if user["error_m"] is not None:
         line += f"; {1e3 * user['error_m']:.3f} mm from the truth"
     return line + (f" ({user['reason']})" if user["reason"] else "")

@@ -116,6 +116,26 @@ def overlay_users(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER
     return ax
 
 
+def overlay_alternatives(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER) -> Axes:
+    """Mark where else each user may be by a hollow dot, with its probability if that is known."""
+    for other in (one for user in users for one in user.alternatives):
+        if other.position is None:
+            continue
+        ax.plot(*other.position[:2], "o", mfc="none", mec=colour, ms=8, mew=1.2, zorder=6)
+        if other.probability is not None:
+            ax.annotate(
+                f"{other.probability:.2g}",
+                _xy(other.position),
+                xytext=(0, -16),
+                textcoords="offset points",
+                color=colour,
+                ha="center",
+                fontsize=8,
+                annotation_clip=True,
+            )
+    return ax
+
+
 def mark_user(ax: Axes, name: str, place: Float[np.ndarray, " 3"], *, colour: str = USER) -> Axes:
     """Mark one user by a named dot."""
     ax.plot(*place[:2], "o", color=colour, mec="white", ms=8, mew=1.2, zorder=6)
@@ -261,6 +281,7 @@ def draw_localization(
     for place in true_positions:
         ax.plot(*place[:2], "o", mfc="none", mec=INK, ms=15, mew=1.4, zorder=7)
     overlay_users(ax, estimate.users)
+    overlay_alternatives(ax, estimate.users)
     return in_metres(ax, view)
 
 

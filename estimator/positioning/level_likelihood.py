@@ -1,0 +1,77 @@
+r"""What the level of a path says about how often it was reflected.
+
+A path of length L between isotropic antennas has the amplitude :math:`\lambda / 4 \pi L`, and each
+reflection takes some of it. Of a user's antenna nothing is told: it may be isotropic, of 0 dBi, or
+of any gain towards the array. So the density of the excess over free space after n reflections is,
+in decibels,
+
+.. math:: p(e \mid n) = \tfrac12 b_n \mathcal N(e; n \mu, \sigma_0^2 + n \sigma^2)
+          + \tfrac12 \mathcal U(e; -40, +25) ,
+
+with a wall's reflection μ ± σ as :mod:`estimator.prediction.wall_reflection` assumes it. An
+isotropic user whom a mirror shows is heard directly as well, and earlier, unless something blocks
+the straight way: where no earlier path is, :math:`b_n` is the probability of that, and else 1. So a
+path at the level of free space is very likely a direct one: mirrors lose something, if only by
+their roughness, and beams that are not aimed at the array do too. In 2500 random rooms, by the
+image method, 1061 of 1903 direct strongest paths and 3 of 176 reflected ones were within 0.3 dB of
+it.
+"""
+
+from math import exp, pi, sqrt
+
+from estimator.channel.path import Path
+from estimator.prediction.wall_reflection import ASSUMED_DB, ASSUMED_DEVIATION_DB, excess_db
+
+ISOTROPIC = 0.5
+"""Prior probability that a user's antenna is an isotropic one. [-]"""
+LEAST_DB, MOST_DB = -40.0, 25.0
+"""Gains towards the array that other antennas may have. [dBi]"""
+LEVEL_DEVIATION_DB = 0.1
+"""Standard deviation of a strong path's level. Of 17 direct paths of tuning rooms all were 0.03 to
+0.08 dB over free space at the centre of the band. [dB]"""
+BLOCKED = 0.2
+"""Probability that something blocks the straight way to a user whom a mirror shows. [-]"""
+TOLD_TO_DB = 1.0
+"""Excess beyond which the antenna has a gain, or the receiver is not calibrated: a level then
+tells nothing. [dB]"""
+
+
+def path_excess_db(path: Path, frequency: float | None) -> float | None:
+    """Return the excess of a path over free space, None where its level tells nothing. [dB].
+
+    Parameters
+    ----------
+    path
+        The path.
+    frequency
+        Centre of the band, None if unknown. [Hz]
+    """
+    gain = abs(path.wave.gain)
+    if frequency is None or not gain > 0:
+        return None
+    excess = excess_db(gain, path.wave.path_length, frequency)
+    return told_excess_db(excess)
+
+
+def told_excess_db(excess: float) -> float | None:
+    """Return an excess if it tells something: not above free space. [dB]."""
+    return excess if LEAST_DB < excess < TOLD_TO_DB else None
+
+
+def level_density(excess: float, reflections: int, *, first: bool = True) -> float:
+    """Return the density of an excess after so many reflections. [1/dB].
+
+    Parameters
+    ----------
+    excess
+        Over free space. [dB]
+    reflections
+        On the way.
+    first
+        Whether no path arrives before it.
+    """
+    seen = BLOCKED if first and reflections else 1.0
+    deviation = sqrt(LEVEL_DEVIATION_DB**2 + reflections * ASSUMED_DEVIATION_DB**2)
+    away = (excess - reflections * ASSUMED_DB) / deviation
+    normal = exp(-0.5 * away**2) / (sqrt(2 * pi) * deviation)
+    return ISOTROPIC * seen * normal + (1 - ISOTROPIC) / (MOST_DB - LEAST_DB)

@@ -1,0 +1,267 @@
+r"""How probable each explanation of a user's paths is, and whether one place holds them all.
+
+An explanation h says over which mirrors some of the paths come; the others it leaves unexplained.
+With the paths' bearings and lengths z, their covariance S (walls' errors in it), a flat prior over
+places u, and the level e of each path,
+
+.. math:: p(h \mid z) \propto \pi_h \Bigl[ \int \mathcal N(z; z_h(u), S)\, \frac{du}{A} \Bigr]
+          \prod_{i \in h} p(e_i \mid n_i) \prod_{i \notin h} \frac{q_i}{\pi L} .
+
+The integral is that of a Gaussian about the least squares solution: paths that agree without need
+weigh a million times what one of them does alone. :math:`\pi_h` is the probability that the rays
+meet the walls' extents as h says. Beside the explanations that the map offers stands *none of
+them*: that a path came over one more mirror, which the map does not show. It weighs by a prior, by
+what the image shows where that mirror would have to be, and by the level: a mirror takes some.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.channel.path import Path, PathSet
+from estimator.geometry.path_tracing import trace
+from estimator.geometry.specular_chains import Chain
+from estimator.positioning.level_likelihood import (
+    level_density,
+    path_excess_db,
+    told_excess_db,
+)
+from estimator.positioning.map_context import MapContext
+from estimator.positioning.weighted_least_squares import Consensus
+from estimator.prediction.wall_reflection import excess_db
+
+CERTAIN = 0.999
+"""Posterior probability of a place from which it is ``found``. [-]"""
+
+UNSEEN = 0.05
+"""Prior probability that a strong path which seems direct comes over a mirror that the map does not
+show. In 2500 random rooms, by the image method, 176 of 2079 strongest paths were reflected ones,
+some over walls that are seen. [-]"""
+
+Sight = Literal["clear", "clear aside", "not shown", "between ends", "something on it"]
+"""What the image shows on a straight way: nothing, within the angles without grating lobes or
+beyond; or it does not show it; two points that may be a mirror's ends; a point on it."""
+
+WITH_A_MIRROR: Mapping[Sight, float] = {
+    "clear": 1 / 8,
+    "clear aside": 1 / 3,
+    "not shown": 1.0,
+    "between ends": 2.5,
+    "something on it": 10.0,
+}
+"""How much likelier the image shows that where an unseen mirror is than where none is. Two points
+are about the straight way of 6 of 22 direct paths of tuning rooms, by chance. [-]"""
+
+CLEAR_UNSEEN = 5e-4
+"""The probability of a mirror on a way that is shown clear, where levels tell nothing. Antennas
+with a gain are aimed at what they see; the image alone decides then. [-]"""
+
+UNEXPLAINED_UNSEEN = 10.0
+"""How much likelier an unseen mirror is for one path if another as strong comes over one for sure:
+nothing that the map shows explains it. [-]"""
+
+FURTHER = {"clear": 5e-4, "between ends": 0.05}
+"""The probability of one more mirror on a way beyond the first that is known, where nothing or a
+mirror's two ends are about it. [-]"""
+
+UNEXPLAINED = 0.1
+"""Prior probability of a path that nothing explains and that is as strong as the answer's. Of one
+that is stronger it falls with the fourth power of the ratio: a quarter of the energy does not
+decide (1 in 1000). [-]"""
+FEEBLE = 0.25
+"""Share of energy, over the strongest path's, below which an unexplained path is usual. [-]"""
+USUAL = 0.5
+"""Prior probability of those: scattering by edges and rough patches. [-]"""
+EARLIER = 1e-4
+"""Probability that a path which passes for a mirror's is there before the direct one: no way is
+shorter than the straight one, and what is taken for one then is none. [-]"""
+EARLIER_CELLS = 4.0
+"""Cells c/2B of the image by which it must be shorter: two of the pilot's. [cells]"""
+BESIDE_CELL = 3.0
+"""Cells of the image within which another path is a part of the same wave: bent by roughness, it is
+fitted by two. [cells]"""
+
+PART = 0.1
+"""Share of energy, over a path's, from which another beside it is a part of the same wave. [-]"""
+
+RINGS = (0.25, 0.5, 0.75, 1.0)
+"""Angles beside a path's own, over its reach of two deviations, at which its ray is tried."""
+
+
+def chain_probabilities(
+    length: float, path: Path, room: MapContext, found: PathSet, reach: float
+) -> dict[Chain, float]:
+    """Return how probable the mirrors are that a path's ray may meet.
+
+    Parameters
+    ----------
+    length
+        Of the path. [m]
+    path, room, found
+        The path, the map, and what the array measures.
+    reach
+        Angle by which the ray may be off a wall's end: two deviations. [rad]
+    """
+    bearing, how = path.wave.bearing, found.how
+    weights: dict[Chain, float] = {}
+
+    def meet(turned: np.ndarray, weight: float) -> None:
+        chain = trace(how.towards(turned), length, room.walls)[1]
+        weights[chain] = weights.get(chain, 0.0) + weight
+
+    meet(bearing, 1.0)
+    for ring in RINGS:
+        around = how.around(bearing, ring * reach)
+        for turned in around:
+            meet(turned, 2 * float(np.exp(-0.5 * (2 * ring) ** 2)) / len(around))
+    total = sum(weights.values())
+    return {chain: weight / total for chain, weight in weights.items()}
+
+
+def log_weight(
+    consensus: Consensus,
+    found: PathSet,
+    room: MapContext,
+    chains: Mapping[int, Mapping[Chain, float]],
+) -> float:
+    """Weigh one explanation; see the module's equation."""
+    total = consensus.log_evidence - np.log(_area(found))
+    used = {one.path: one.chain for one in consensus.sightings}
+    strongest = max(found.paths[index].share for index in used)
+    straight = next((found.paths[i].wave.path_length for i, c in used.items() if not c), None)
+    early = EARLIER_CELLS * room.resolution.along_ray
+    for index, chain in used.items():
+        path = found.paths[index]
+        total += np.log(max(chains[index].get(chain, 0.0), 1e-12))
+        excess = level_of(path, found, room)
+        if excess is not None:
+            first = arrives_first(path, found, room)
+            total += np.log(level_density(excess, len(chain), first=first))
+    for index in chains:
+        if index in used:
+            continue
+        path = found.paths[index]
+        if any(beside(path, found.paths[other], room) for other in used):
+            continue  # a part of a wave that is explained
+        total += np.log(_unexplained(path.share / strongest) / _directions(found, path))
+        if straight is not None and path.wave.path_length < straight - early:
+            total += np.log(EARLIER)
+        excess = level_of(path, found, room)
+        if excess is not None:
+            total += np.log(level_density(excess, 2))
+    return float(total)
+
+
+def level_of(path: Path, found: PathSet, room: MapContext) -> float | None:
+    """Return a path's excess over free space; None if it tells nothing. [dB].
+
+    Of a wave that roughness bends so that it was fitted by two, it is all of the pilot's power that
+    other paths do not hold.
+    """
+    parts = [other for other in found.paths if other is not path and beside(path, other, room)]
+    if not any(other.share > PART * path.share for other in parts):
+        return path_excess_db(path, found.frequency)
+    if found.frequency is None or found.power is None:
+        return None
+    rest = 1.0 - sum(
+        one.share for one in found.paths if one is not path and all(one is not p for p in parts)
+    )
+    if not rest > 0:
+        return None
+    amplitude = float(np.sqrt(rest * found.power))
+    return told_excess_db(excess_db(amplitude, path.wave.path_length, found.frequency))
+
+
+def arrives_first(path: Path, found: PathSet, room: MapContext) -> bool:
+    """Tell whether no mirror-like path is shorter than a path, beyond the resolution."""
+    early = EARLIER_CELLS * room.resolution.along_ray
+    return not any(
+        one.specular and one.wave.path_length < path.wave.path_length - early for one in found.paths
+    )
+
+
+def beside(one: Path, other: Path, room: MapContext) -> bool:
+    """Tell whether two paths may be parts of one wave that roughness bends."""
+    apart = np.abs(one.wave.bearing - other.wave.bearing)
+    # The uplink's cells are twice the echo's.
+    near = 2 * BESIDE_CELL * room.resolution.across_ray
+    late = abs(one.wave.path_length - other.wave.path_length)
+    return bool(np.all(apart < near) and late < 2 * BESIDE_CELL * room.resolution.along_ray)
+
+
+def unseen_odds(explanation: Consensus, found: PathSet, room: MapContext, sight: Sight) -> float:
+    """Return the odds that a lone path came over one more mirror than it is said to. [-].
+
+    Parameters
+    ----------
+    explanation
+        Of the path.
+    found, room
+        The paths and the map.
+    sight
+        What the image shows of the way on which that mirror would be: the straight way of a direct
+        path, the legs beyond the first mirror of one that was reflected.
+    """
+    (only,) = explanation.sightings
+    path = found.paths[only.path]
+    more = UNEXPLAINED_UNSEEN if strong_unexplained(explanation, found, room) else 1.0
+    excess = level_of(path, found, room)
+    if only.chain:
+        odds = FURTHER["between ends" if sight == "between ends" else "clear"]
+    elif excess is None and sight in ("clear", "clear aside"):
+        odds = CLEAR_UNSEEN
+    else:
+        odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[sight]
+    if excess is not None:
+        bounces = len(only.chain)
+        first = arrives_first(path, found, room)
+        odds *= level_density(excess, bounces + 1, first=first)
+        odds /= level_density(excess, bounces, first=first)
+    return odds * more
+
+
+def strong_unexplained(explanation: Consensus, found: PathSet, room: MapContext) -> bool:
+    """Tell whether a mirror-like path about as strong as an explanation's is left over.
+
+    One that comes from where the image shows nothing, and is longer, may come over walls that no
+    image shows, such as a floor: it says nothing of others.
+    """
+    used = [found.paths[one.path] for one in explanation.sightings]
+    energy = sum(path.share for path in used)
+    shortest = min(path.wave.path_length for path in used)
+    for index, path in enumerate(found.paths):
+        if not path.specular or index in {one.path for one in explanation.sightings}:
+            continue
+        strong = path.share > FEEBLE * energy and not any(beside(path, u, room) for u in used)
+        shown = room.shows(found.how.towards(path.wave.bearing))
+        if strong and (shown or path.wave.path_length < shortest):
+            return True
+    return False
+
+
+def _unexplained(ratio: float) -> float:
+    """Return the prior probability of a path over its share in that of the explained ones."""
+    if ratio < FEEBLE:
+        return USUAL
+    return UNEXPLAINED / max(ratio, 1.0) ** 4
+
+
+def _directions(found: PathSet, path: Path) -> float:
+    """Return the extent of what a path may be: bearings times lengths. [rad m] or [m]."""
+    flat = len(found.how.coordinates) == 2
+    return float((np.pi if flat else 2 * np.pi) * path.unambiguous)
+
+
+def normalised(weights: Sequence[float]) -> Float[np.ndarray, " weights"]:
+    """Turn logarithms of weights into probabilities."""
+    values = np.exp(np.array(weights) - max(weights))
+    return np.asarray(values / values.sum())
+
+
+def _area(found: PathSet) -> float:
+    """Area, or volume, in which a user may be: half a disk, or half a ball. [m²] or [m³]."""
+    reach = max(path.unambiguous for path in found.paths)
+    flat = len(found.how.coordinates) == 2
+    return float(np.pi / 2 * reach**2 if flat else 2 * np.pi / 3 * reach**3)
