@@ -44,7 +44,7 @@ END_DEVIATIONS = 3.0
 """Deviations of the angle, beside the image's cell, by which a ray may meet another wall. [-]."""
 SAME = 1 - false_alarm.DISAGREEMENT
 """Probability with which two estimates of one position pass for the same. [-]"""
-NEGLIGIBLE = 1e-5
+NEGLIGIBLE = 1e-6
 """Probability of a place below which it is not named. [-]"""
 UNSEEN_SOMEWHERE = (
     "the path is weaker than a direct one, or comes from where little is shown: a wall that the "

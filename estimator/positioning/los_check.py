@@ -7,7 +7,6 @@ shows. The user's pilot alone cannot distinguish the user from its image in such
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 from jaxtyping import Float
@@ -63,7 +62,8 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
         What the array measures of a direction.
     """
     heading, length = how.towards(wave.bearing), wave.path_length
-    shown, sight = room.shows(heading), cast(Sight, "clear")
+    shown = room.shows(heading)
+    sight: Sight = "clear"
     peaks = [room.unassigned_peaks]
     if not shown and room.aside is not None:
         # An image beyond the angles without grating lobes has more in it than there is, not less.

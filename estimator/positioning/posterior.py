@@ -74,7 +74,7 @@ FEEBLE = 0.25
 """Share of energy, over the strongest path's, below which an unexplained path is usual. [-]"""
 USUAL = 0.5
 """Prior probability of those: scattering by edges and rough patches. [-]"""
-EARLIER = 1e-4
+EARLIER = 1e-5
 """Probability that a path which passes for a mirror's is there before the direct one: no way is
 shorter than the straight one, and what is taken for one then is none. [-]"""
 EARLIER_CELLS = 4.0
