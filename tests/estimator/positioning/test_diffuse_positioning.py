@@ -129,6 +129,7 @@ def test_the_diffuse_field_answers_where_no_path_stands_out() -> None:
     assert answer.status == "ambiguous"
     (behind,) = answer.alternatives
     assert behind.position is not None
+    assert answer.position is not None
     np.testing.assert_allclose(WALL.mirrored(behind.position), answer.position, atol=1e-12)
     assert behind.probability is not None
     assert answer.probability is not None
