@@ -225,11 +225,11 @@ def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 p
         )
     profiles = focuser.profiles
     corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1)
-    # A length is convex: over the box around the points it is largest at a corner.
-    if _longest_path(profiles, corners) <= profiles.unambiguous:
+    # A length is convex, over the points' places and over the antennas': at most what corners of
+    # the boxes around them give.
+    if np.all(_longest_possible(profiles, corners) <= profiles.unambiguous):
         return
-    # It is convex over the antennas' places as well: at most what the box around them gives.
-    bound = profiles.passes * sum(_farthest_corner(leg, points) for leg in profiles.legs)
+    bound = _longest_possible(profiles, points)
     longest = _longest_path(profiles, points[:, bound > profiles.unambiguous])
     if longest > profiles.unambiguous:
         ways = profiles.passes * len(profiles.legs)
@@ -238,6 +238,14 @@ def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 p
             f"unambiguous only up to {profiles.unambiguous / ways:.3f} m; take smaller frequency "
             "steps or a nearer grid"
         )
+
+
+def _longest_possible(
+    profiles: RangeProfiles, points: Float[np.ndarray, "3 points"]
+) -> Float[np.ndarray, " points"]:
+    """Bound the paths from points to the antennas. [m]."""
+    ways = np.sum([_farthest_corner(leg, points) for leg in profiles.legs], axis=0)
+    return np.asarray(profiles.passes * ways)
 
 
 def _farthest_corner(
