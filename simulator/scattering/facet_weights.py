@@ -120,15 +120,17 @@ class MaterialPart:
                 line, echoes = self._rough_line(number, side, nodes)
                 which, places = some[here], run.places[some[here]]
                 if self.monostatic:
-                    weights[:, here] = echoes(inward.along(facets, which), places)
+                    found = echoes(inward.along(facets, which), places)
                 else:
                     sent, heard = (
                         (leg.along(facets, which), np.abs(leg.cosine[which]))
                         for leg in (inward, outward)
                     )
-                    weights[:, here] = line.weights(
-                        sent, heard, places, side=side, monostatic=False
-                    )
+                    found = line.weights(sent, heard, places, side=side, monostatic=False)
+                if here.size == some.size:
+                    weights = found.astype(np.complex128)
+                else:
+                    weights[:, here] = found
         if self.common is not None:
             half = reflection_of_front(self.material, nodes, polarization=self.polarization)
             weights[:, facets.rough[some]] /= half[:, None]
@@ -223,13 +225,18 @@ class Leg:
         self.lit = ports.visible[index] & (facets.two_sided | (self.facing > 0))
         self.pattern, self.polarization = ports.pattern, ports.polarization
         self._gains: dict[int, np.ndarray] = {}
+        self._along: np.ndarray | None = None
 
     def along(
         self, facets: Facets, some: Int[np.ndarray, " chosen"]
     ) -> Float[np.ndarray, " chosen"]:
         """Component of the direction along a line's mean course. [-]."""
-        direction, normal = self.direction[some], facets.normals[some]
-        return np.asarray(direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1])
+        if self._along is None:
+            direction, normal = self.direction, facets.normals
+            self._along = np.asarray(
+                direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1]
+            )
+        return self._along[some]
 
     def fields(self, some: np.ndarray) -> Float[np.ndarray, "some 3"]:
         """Vectors of the antenna's field at some of the facets."""

@@ -88,6 +88,9 @@ def scattered(
     if _suits_the_kernel(facets, transmit, receive, parts):
         return _by_kernel(facets, transmit, receive, parts, frequencies, advance)
     shared = Leg(facets, transmit, 0) if len(transmit.positions) == 1 else None
+    sent_view = None
+    if shared is not None and facets.corners:
+        sent_view = edge_view(facets.corners, transmit, 0, frequencies)
 
     def link(index: int) -> Complex[np.ndarray, " freqs"]:
         inward = shared or Leg(facets, transmit, index)
@@ -99,10 +102,14 @@ def scattered(
             chosen = lit if part.mask is None else lit & part.mask
             spectrum += _partial_link(facets, chosen, inward, outward, part, waves)
         if facets.corners:
-            views = (
-                edge_view(facets.corners, transmit, index if shared is None else 0, frequencies),
-                edge_view(facets.corners, receive, index, frequencies),
-            )
+            view = edge_view(facets.corners, receive, index, frequencies)
+            if monostatic:
+                views = view, view
+            else:
+                views = (
+                    sent_view or edge_view(facets.corners, transmit, index, frequencies),
+                    view,
+                )
             spectrum += edge_echo(facets.corners, facets, lit, views, frequencies, waves=waves)
         advance()
         return spectrum
@@ -195,8 +202,11 @@ def _partial_link(
     at_once = max(1, SAMPLES_AT_ONCE // nodes.size)
     for first in range(0, len(lit), at_once):
         some = lit[first : first + at_once]
-        lengths = inward.distance[some] + outward.distance[some]
-        product = inward.distance[some] * outward.distance[some]
+        one, sent = inward.distance[some], inward.direction[some]
+        other, heard = one, sent
+        if outward is not inward:
+            other, heard = outward.distance[some], outward.direction[some]
+        lengths, product = one + other, one * other
         amplitude = facets.sizes[some] / (8 * np.pi)
         if not facets.flat:  # (jk/λ)(λ/4π)² = j/(8π)
             amplitude = amplitude / product
@@ -204,8 +214,9 @@ def _partial_link(
             amplitude = amplitude / np.sqrt(product * lengths)
         else:  # jk G² with |G|² = 1/(8πkr)
             amplitude = amplitude / np.sqrt(product)
-        gain = inward.gain(some, nodes) * outward.gain(some, nodes)
-        slope = (inward.direction[some] + outward.direction[some])[:, None, :] * facets.edges[some]
+        gain = inward.gain(some, nodes)
+        gain = gain * (gain if outward is inward else outward.gain(some, nodes))
+        slope = (sent + heard)[:, None, :] * facets.edges[some]
         advances = slope.sum(axis=-1) / speed_of_light  # along each edge [s]
         shape = facet_transform(2 * np.pi * nodes[:, None, None] * advances)
         shape = shape * part.weights(inward, outward, some, nodes, facets)
