@@ -236,7 +236,7 @@ class Leg:
             self._along = np.asarray(
                 direction[:, 1] * normal[:, 0] - direction[:, 0] * normal[:, 1]
             )
-        return self._along[some]
+        return np.asarray(self._along[some])
 
     def fields(self, some: np.ndarray) -> Float[np.ndarray, "some 3"]:
         """Vectors of the antenna's field at some of the facets."""
