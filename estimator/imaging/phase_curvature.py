@@ -60,7 +60,7 @@ def bent_intensities(
     tried = np.exp(1j * phase).reshape(-1, unit.size)
     best = np.zeros((len(points), BENDS.size))
     for shift in RANGE_SHIFTS:
-        aligned = _aligned(profiles, points, shift * resolution.along_ray)
+        aligned = aligned_profiles(profiles, points, shift * resolution.along_ray)
         # Not a matrix product: its bytes would depend on the number of threads.
         focused = np.einsum("pm,km->pk", aligned, tried).reshape(-1, BENDS.size, SHIFTS.size)
         best = np.maximum(best, (np.abs(focused) ** 2).max(axis=-1))
@@ -109,7 +109,7 @@ def coherence_factor(
     tilts = np.exp(1j * np.pi * (TILTS if flat else np.zeros(1))[:, None] * unit)
     best = np.zeros(len(points))
     for shift in RANGE_SHIFTS:
-        aligned = _aligned(profiles, points, shift * resolution.along_ray)
+        aligned = aligned_profiles(profiles, points, shift * resolution.along_ray)
         energy = np.einsum("pm,pm->p", aligned, aligned.conj()).real
         tilted = np.einsum("pm,tm->pt", aligned * turn, tilts)
         wave = (np.abs(tilted) ** 2).max(axis=1) / offset.size
@@ -118,7 +118,7 @@ def coherence_factor(
     return best
 
 
-def _aligned(
+def aligned_profiles(
     profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], farther: float
 ) -> Complex[np.ndarray, "points channels"]:
     """Read each channel's profile at each point, the path's phase taken out."""

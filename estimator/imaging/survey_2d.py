@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 
 from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
-from estimator.array.resolution_cell import Resolution
+from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.peak_detection import image_contrast, mean_background, significant_peaks
 from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
+from estimator.imaging.range_alias import FocusByRange, focus_by_range
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
 
@@ -43,9 +44,13 @@ class Survey:
     values: Complex[np.ndarray, "ranges sines"]
     points: Float[np.ndarray, "ranges sines 3"]  # in the array's frame [m]
     peaks: Float[np.ndarray, "peaks 3"]  # that stand out of the background, strongest first [m]
-    bent: Bool[np.ndarray, " peaks"]  # whether they were scattered twice: seen nowhere
+    bent: Bool[np.ndarray, " peaks"]
+    """Whether nothing is where they appear: they were scattered twice, or are beyond the
+    unambiguous range."""
+    beyond: Bool[np.ndarray, " peaks"]  # whether they are beyond the unambiguous range
     as_point: Float[np.ndarray, " peaks"]  # coherence over the aperture, as that of a point [-]
     as_mirror: Float[np.ndarray, " peaks"]  # the same as that of a mirror facing the array [-]
+    by_range: FocusByRange  # the peaks as from where they are imaged, and as from farther away
     background: float  # mean intensity of what is no echo [-]
 
     @property
@@ -74,7 +79,10 @@ def survey(echo: Echo) -> Survey:
     taper = survey_weights(echo)
     values = backproject(echo, points, weights=taper)
     peaks = significant_peaks(np.abs(values) ** 2, points)
-    tried = bent_intensities(range_profiles(echo), peaks, resolution)
+    untapered = range_profiles(echo)
+    tried = bent_intensities(untapered, peaks, resolution)
+    by_range = focus_by_range(untapered, peaks, resolution)
+    beyond = by_range.points_beyond(peaks, coarse_resolution(resolution))
     # What the noise in the image is before the sum over the positions.
     background = mean_background(np.abs(values) ** 2)
     noise = background * taper.sum() ** 2 / (taper**2).sum()
@@ -90,8 +98,11 @@ def survey(echo: Echo) -> Survey:
         values=values,
         points=points,
         peaks=peaks,
-        bent=(tried.max(axis=1) > MOST_GAIN * tried[:, 0])
+        beyond=beyond,
+        bent=beyond
+        | (tried.max(axis=1) > MOST_GAIN * tried[:, 0])
         & ~_faces(peaks, tried[:, 0], by_shape[1], resolution),
+        by_range=by_range,
         as_point=by_shape[0],
         as_mirror=by_shape[1],
         background=background,

@@ -17,7 +17,7 @@ from estimator.channel.angle_range_map_2d import (
 from estimator.channel.path_extraction_2d import find_paths
 from estimator.imaging.look_aside_2d import peaks_aside
 from estimator.imaging.range_compression import unambiguous_path
-from estimator.localization.aliasing import aliasing_notes
+from estimator.localization.aliasing import aliasing_notes, range_notes
 from estimator.localization.close_range import close_scene
 from estimator.localization.constant_room import RoomBehindConstant
 from estimator.localization.imaged_scene import imaged_scene
@@ -72,7 +72,10 @@ class LinearRoom:
     def notes(self) -> tuple[str, ...]:
         """Where the image ends."""
         spacing = float(np.ptp(self.echo.positions[:, 0])) / (len(self.echo.positions) - 1)
-        return aliasing_notes(spacing, self.echo.frequencies, imaged_sine(self.echo))
+        return (
+            *aliasing_notes(spacing, self.echo.frequencies, imaged_sine(self.echo)),
+            *range_notes(self.echo, self.map.survey.beyond),
+        )
 
     def refined(self, found: UserEstimate, uplink: Uplink) -> UserEstimate:
         """Add what rough walls scatter of the pilot."""

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
@@ -172,6 +172,8 @@ def _fitted(
             continue
         if _is_uncertain(line, resolution):
             continue
+        if looked.by_range.is_beyond(_peaks_on(line, looked, coarse)):
+            continue
         evidence = examine(echo, line, resolution)
         shallow = evidence.depth < LEAST_DEPTH
         if shallow and not _reflects(line, looked, coarse):
@@ -218,15 +220,19 @@ def _fitted_line(
     return own if between.explained > followed.explained else line
 
 
+def _peaks_on(line: FittedLine, looked: Survey, coarse: Resolution) -> Bool[np.ndarray, " peaks"]:
+    return np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
+
+
 def _reflects(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
     """Tell whether the array is seen reflected in a line."""
-    on = np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
+    on = _peaks_on(line, looked, coarse)
     return bool(np.any(looked.as_mirror[on] >= REFLECTED))
 
 
 def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
     """Tell whether the peaks on a line are waves that come from there, as a wall's are."""
-    on = np.array([lies_on(peak, line, coarse) for peak in looked.peaks], dtype=bool)
+    on = _peaks_on(line, looked, coarse)
     if not on.any():
         return True
     if np.mean(looked.bent[on]) > MOST_BENT:
