@@ -1,5 +1,6 @@
 from .commands.dataset import make_dataset
 from .commands.design import design
+from .commands.focus import image
 from .commands.sweep import sweep
 from .commands.track import track
 from .datasets import open_dataset
@@ -20,6 +21,7 @@ __all__ = [
     "Scenario",
     "Uplink",
     "design",
+    "image",
     "import_measured",
     "load_scenario",
     "locate",

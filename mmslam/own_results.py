@@ -9,9 +9,13 @@ MEASUREMENT = "measurement.zarr"
 REPORT = "report.html"
 TRACK = "track.json"
 TRACK_FIGURE = "track.png"
+IMAGE = "image.json"
 FORMAT = 1
 
 FIGURES = ("raw_image.png", "corrected_image.png", "angle_range_map.png", "localization.png")
+
+
+IMAGE_PARTS = ("image.npz", "image.png", "cuts.png")
 
 
 def refuse_foreign_results(folder: Path) -> str | None:
@@ -24,6 +28,11 @@ def refuse_foreign_results(folder: Path) -> str | None:
 def refuse_foreign_track(folder: Path) -> str | None:
     """Say why a folder may not be replaced by a new track; None if an earlier one is in it."""
     return _refuse_foreign(folder, TRACK, {"tracks", "versions"}, {TRACK_FIGURE})
+
+
+def refuse_foreign_image(folder: Path) -> str | None:
+    """Say why a folder may not be replaced by a new image; None if an earlier one is in it."""
+    return _refuse_foreign(folder, IMAGE, {"pixels", "peak_m", "method"}, set(IMAGE_PARTS))
 
 
 def _refuse_foreign(folder: Path, main: str, keys: set[str], beside: set[str]) -> str | None:

@@ -153,6 +153,61 @@ def locate(
         print_outcome(outcome.result, outcome.folder, as_json)
 
 
+def image(
+    measurement: Annotated[Path, typer.Argument(metavar="FILE.zarr", help="The measurement.")],
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
+    ] = None,
+    x: Annotated[
+        tuple[float, float] | None, typer.Option("--x", metavar="FROM TO", help="Region [m].")
+    ] = None,
+    y: Annotated[
+        tuple[float, float] | None, typer.Option("--y", metavar="FROM TO", help="Region [m].")
+    ] = None,
+    z: Annotated[
+        tuple[float, float] | None, typer.Option("--z", metavar="FROM TO", help="Region [m].")
+    ] = None,
+    pixel: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Spacing [half the finest resolution].")
+    ] = None,
+    min_range: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Nearest that is looked at.")
+    ] = None,
+    max_range: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Farthest that is looked at.")
+    ] = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Focus a measurement to an image, of any array; no search for walls or users.
+
+    What is not given is chosen by where the energy is. Writes to `--out` (default
+    `out/NAME-image/`) the image (`image.npz`), what was chosen (`image.json`), and its pictures:
+    the brightest voxels from three sides, and three planes through the brightest one.
+    """
+    with told_clearly():
+        with stdout_kept_clean():
+            from mmslam.commands.focus import image_lines, image_to_folder
+
+            nothing = (None, None)
+            document, folder = image_to_folder(
+                measurement,
+                sample=sample,
+                folder=out,
+                x=x or nothing,
+                y=y or nothing,
+                z=z or nothing,
+                pixel=pixel,
+                min_range=min_range,
+                max_range=max_range,
+            )
+        if as_json:
+            print_json(document)
+            return
+        for line in image_lines(document, folder):
+            typer.echo(visible(line))
+
+
 def track(
     measurements: Annotated[
         Path, typer.Argument(metavar="FILE.zarr", help="A dataset whose samples are times.")
