@@ -13,8 +13,10 @@ from estimator.imaging.range_migration import at_pixels, over_aperture, transfor
 from estimator.measurement.model import Echo
 from estimator.results.pixel_grid import PixelGrid
 
-CHUNK = 4_000_000
-"""Plane waves times depths that are worked on at once. [-]"""
+CHUNK = 64_000_000
+"""Plane waves times depths that are worked on at once: half a gigabyte. [-]"""
+GRAZING = 1e-3
+"""Least wavenumber along the depth, over the wave's, that is kept: 0.06° above the aperture. [-]"""
 
 
 def angular_spectrum(
@@ -55,20 +57,24 @@ def angular_spectrum(
     area = axes[0].period * axes[1].period
     image = np.zeros((grid.x.size, depth.size, grid.z.size), dtype=np.complex128)
     step = max(1, CHUNK // shift.size)
+    pace = float(depth[1] - depth[0]) if depth.size > 1 else 0.0
     for first in range(0, depth.size, step):
         part = depth[first : first + step]
-        total = np.zeros((*shift.shape, part.size), dtype=np.complex64)
+        total = np.zeros((part.size, *shift.shape), dtype=np.complex64)
         for index, frequency in enumerate(echo.frequencies):
             wave = 4 * np.pi * float(frequency) / speed_of_light
             square = wave**2 - along[:, None] ** 2 - up**2
-            ahead = np.sqrt(np.maximum(square, (1e-3 * wave) ** 2))
-            kept = (square > (1e-3 * wave) ** 2) * 1.0
+            ahead = np.sqrt(np.maximum(square, (GRAZING * wave) ** 2))
+            kept = (square > (GRAZING * wave) ** 2) * 1.0
             for axis, places in ((axes[0], np.abs(along)[:, None]), (axes[1], np.abs(up)[None])):
                 beyond = (axis.tangent + axis.slope - places / ahead) / axis.slope
                 kept = kept * np.clip(beyond, 0.0, 1.0)
-            flat = spectra[..., index] * shift * (kept * wave / ahead**2)
-            used = kept > 0
-            total[used] += flat[used][:, None] * np.exp(1j * np.outer(ahead[used], part))
-        planes = at_pixels(at_pixels(total, 0, axes[0], grid.x), 1, axes[1], grid.z)
-        image[:, first : first + step] = planes.transpose(0, 2, 1)
+            weight = shift * (kept * wave / ahead**2) * np.exp(1j * ahead * part[0])
+            field = (spectra[..., index] * weight).astype(np.complex64)
+            farther = np.exp(1j * ahead * pace).astype(np.complex64)
+            for plane in total:
+                plane += field
+                field *= farther  # one step on: 1e-7 of rounding each
+        planes = at_pixels(at_pixels(total, 1, axes[0], grid.x), 2, axes[1], grid.z)
+        image[:, first : first + step] = planes.transpose(1, 0, 2)
     return np.asarray(image * (2j * np.pi * depth / (area * gain))[:, None])

@@ -26,9 +26,9 @@ MOST_PIXELS = {2: 2_000_000, 3: 6_000_000}
 MOST_SUMS = 3e9
 """Pixels times positions up to which the image is back-projected, about ten seconds on two cores;
 beyond, range migration forms it where the aperture is a grid. [-]"""
-FEW = 32
-"""Frequencies up to which a planar scan's image is summed frequency by frequency: of so few, range
-migration interpolates the spectrum badly where all of the unambiguous range is needed. [-]"""
+FEW = 128
+"""Frequencies up to which a planar scan's image is summed frequency by frequency, in little memory:
+of few ones range migration interpolates the spectrum badly. Of more it is faster. [-]"""
 WIDEST_SINE = 0.95
 """Largest sine of an angle off the array's normal that is imaged beyond its edges. [-]"""
 UNREFINED = 1.05
