@@ -31,6 +31,7 @@ from estimator.walls.plane_fit import (
     refine_plane,
     towards_array,
 )
+from estimator.walls.shared_constant import CONFIDENCE
 from estimator.wavefronts.curvature_search_3d import search_wavefront
 from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
@@ -66,6 +67,9 @@ LOBE_CELLS = 1.5
 """Distance from a wall's plane at which its grating lobe's origin may lie. [cells]"""
 MOST = 0.5
 """Share of points, or of intensity, from which most of something is meant. [-]"""
+FLASH_CELLS = 4.0
+"""Distance beyond the array's extent, from the foot of its perpendicular, up to which a plane shows
+no more than the array's reflection: a small plate does so as well, and a constant. [cells]"""
 INNER = 0.7
 """Where between its centre and its corners a polygon is sampled as well: half of its area is
 inside. [-]"""
@@ -144,7 +148,19 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
         points = points_on(found[i].wall, fine)[1]
         if not lobe_of_a_wall(echo, array, points, np.abs(looked.at(points)) ** 2, stronger):
             order.append(i)
-    return Planes(fitted=tuple(found[i] for i in order), head_on=tuple(head_on[i] for i in order))
+    fitted = tuple(_in_doubt(found[i], array, fine) for i in order)
+    return Planes(fitted=fitted, head_on=tuple(head_on[i] for i in order))
+
+
+def _in_doubt(plane: FittedPlane, array: PlanarArray, fine: Resolution) -> FittedPlane:
+    """Bound the confidence of a plane of which no more is seen than the array's own reflection."""
+    wall = plane.wall
+    foot = float(wall.centre @ wall.normal) * wall.normal
+    blur = FLASH_CELLS * fine.across_ray * float(np.linalg.norm(foot))
+    reach = float(np.linalg.norm(wall.corners - foot, axis=1).max())
+    if reach > array.half + blur:
+        return plane
+    return replace(plane, confidence=min(plane.confidence, CONFIDENCE))
 
 
 def lobe_of_a_wall(

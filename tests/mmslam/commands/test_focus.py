@@ -48,6 +48,7 @@ def test_an_image_is_formed_where_the_energy_is_and_where_it_is_asked_for(
 def test_the_command_writes_the_image_and_replaces_its_own_only(
     scan: Measurement, tmp_path: Path
 ) -> None:
+    assert scan.echo is not None
     own = mmslam.Measurement.from_arrays(
         frequencies=scan.echo.frequencies, positions=scan.echo.positions, echo=scan.echo.samples
     )
