@@ -54,6 +54,7 @@ def test_a_letter_close_to_the_scan_is_focused(distance: float, count: int) -> N
     ]
     np.add.at(truth, tuple(columns), 1.0)
     assert made.image.grid.y.size == 1
+    assert measurement.echo is not None
     cells = cells_at(measurement.echo, np.array([[0.0, distance, 0.0]]))[0]
     truth = gaussian_filter(truth, 0.6 * cells[[0, 2]] / 2e-3)
     match = (seen * truth).sum() / np.linalg.norm(seen) / np.linalg.norm(truth)
