@@ -15,3 +15,7 @@ class Effects(Checked):
         True,
         description="whether slabs of a dielectric let waves through; else every surface blocks",
     )
+    diffraction: bool = Field(
+        False,
+        description="whether pilots bend round edges of opaque plates and boxes (2-D scenes only)",
+    )

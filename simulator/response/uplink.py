@@ -14,6 +14,7 @@ from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
 from simulator.response.direct_pilot import direct_pilot
 from simulator.response.over_one_surface import over_one_surface
+from simulator.response.round_edges import pilot_round_edges
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scene.array_antennas import array_group, in_space, user_group
 from simulator.scene.radio_scene import RadioScene, facet_ports
@@ -63,6 +64,8 @@ def simulate_uplink(
         over_more_there = _over_mirrors(scene, sender, array_there)
         over_more_there += _diffuse_over_mirrors(scene, sender, array_there)
         return np.asarray(pilot + over_one + over_more_there)
+    if scene.scenario.effects.diffraction:
+        pilot = pilot + pilot_round_edges(scene, user)
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])

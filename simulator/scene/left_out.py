@@ -143,7 +143,8 @@ def _of_user(scenario: Scenario, room: "_Room", name: str) -> Iterator[tuple[str
         yield "transmission through slabs", through.pilot(name, 0, min(most, LONGEST_COMPARED))
     if len(room.mirrors) ** (most + 1) <= MOST_CHAINS:
         yield f"paths of {most + 1} bounces", room.pilot(name, most + 1, most + 1)
-    yield "diffraction round edges", room.round_an_edge(name)
+    if not scenario.effects.diffraction:
+        yield "diffraction round edges", room.round_an_edge(name)
 
 
 class _Room(NamedTuple):

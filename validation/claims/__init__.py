@@ -2,6 +2,7 @@
 
 from validation.claims import (
     closed_forms,
+    diffraction,
     full_wave,
     imaging,
     limits,
@@ -17,6 +18,7 @@ ALL_CLAIMS: tuple[Claim, ...] = (
     *closed_forms.CLAIMS,
     *propagation.CLAIMS,
     *transmission.CLAIMS,
+    *diffraction.CLAIMS,
     *imaging.CLAIMS,
     *full_wave.CLAIMS,
     *thesis.CLAIMS,
