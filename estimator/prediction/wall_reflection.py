@@ -44,7 +44,7 @@ class Reflections:
         return float(times @ self.level_db), float(np.sqrt(max(variance, 0.0)))
 
 
-def excess_db(gain: complex, path_length: float, frequency: float) -> float:
+def excess_db(gain: complex | float, path_length: float, frequency: float) -> float:
     r"""Return a path's gain over that of free space, :math:`|g| \, 4 \pi L / \lambda`. [dB].
 
     Parameters
