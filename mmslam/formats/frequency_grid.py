@@ -56,6 +56,8 @@ def ordered_sweep(
     """
     unit = mapping.frequency.unit if mapping.frequency is not None else None
     remedy = f"[frequency] unit = {unit!r} may be wrong" if unit else "the file's unit may be wrong"
+    if mapping.time is not None:
+        remedy = f"time.band_ghz = {mapping.time.band_ghz} may be wrong"
     notes = [check_frequencies(name, frequencies, remedy)]
     if frequencies.size > 1 and np.all(np.diff(frequencies) < 0):
         samples, frequencies = samples[:, ::-1], frequencies[::-1]
