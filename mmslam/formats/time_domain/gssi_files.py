@@ -1,6 +1,6 @@
 """GSSI's .DZT files of ground-penetrating radar: a header for each channel, then the scans.
 
-The offsets are those of GSSI's manual of the SIR-3000, appendix on the DZT format (little-endian):
+The offsets are those that the open reader ``readgssi`` takes (little-endian):
 0 tag, 2 offset of the data, 4 samples a scan, 6 bits, 14 scans a metre, 22 position and 26 range
 [ns], 52 channels, 54 permittivity. The range is taken for that of `samples` steps (some programs
 take one less: 0.2 % of the delay at 512 samples).
