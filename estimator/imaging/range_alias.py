@@ -53,10 +53,14 @@ class FocusByRange:
 
     def is_beyond(self, which: Bool[np.ndarray, " points"]) -> bool:
         """Tell whether some of the points, taken together, are beyond the unambiguous range."""
-        here, beyond, flat = (
-            float(values[which].sum()) for values in (self.here, self.beyond, self.flat)
+        if not which.any():
+            return False
+        # The reflection of a part of the array, bright and nearly flat, would outweigh its wall.
+        over_here, over_flat = (
+            float(np.minimum(self.beyond[which] / other[which], MOST).mean())
+            for other in (self.here, self.flat)
         )
-        return beyond > BEYOND_HERE * here and beyond > BEYOND_FLAT * flat
+        return over_here > BEYOND_HERE and over_flat > BEYOND_FLAT
 
     def points_beyond(
         self, points: Float[np.ndarray, "points 3"], resolution: Resolution
