@@ -228,8 +228,10 @@ def onward(
     seen, ports, columns = sight.seen, len(bounds.shortest), target.count
     shape = (nodes.size, ports, columns)
     strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
+    if not seen.any():
+        return Wave(strength=np.zeros_like(strength), slope=np.zeros_like(slope), bounds=bounds)
     # The mirror that would lead from the ports to the middle of what is seen of the target.
-    towards = target.centres[seen.any(axis=0)].mean(axis=0) if seen.any() else wall.centres[0]
+    towards = target.centres[seen.any(axis=0)].mean(axis=0)
     table = reflection_table(wall.material, nodes, polarization=wall.polarization)
     incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
     plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
@@ -242,7 +244,7 @@ def onward(
     )
     aside = np.stack([-outward[:, 1], outward[:, 0]], axis=-1)
     rough = None
-    if wall.rough.any() and seen.any():
+    if wall.rough.any():
         centre = float(nodes[nodes.size // 2])
         rough = rough_sources(wall, wave.bounds.origins, target.centres, seen, centre)
 

@@ -9,7 +9,7 @@ from validation.random_rooms.judging import judge_rooms
 from validation.random_rooms.room_pictures import draw_rooms
 from validation.random_rooms.room_summary import summarise, table_rows
 
-QUICK, FULL = 40, 200
+QUICK, FULL = 10, 200
 PICTURES = 4
 
 WRONG = 0.03
