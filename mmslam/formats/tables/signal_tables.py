@@ -1,8 +1,10 @@
 """The samples of a signal: which variables, in which order, and what is taken out of them."""
 
+from math import isfinite
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
+from pydantic_core import PydanticCustomError
 
 from mmslam.formats.tables.position_table import PositionTable
 from mmslam.formats.tables.sources import Entries, Name, Source, Vector
@@ -30,6 +32,21 @@ class RawTable(Checked):
     header_bytes: Annotated[int, Field(ge=0)] = Field(
         default=0, description="how many bytes at the file's begin are left out"
     )
+
+
+def _delay_or_focus(value: object) -> float | Literal["focus"]:
+    if value == "focus":
+        return "focus"
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise PydanticCustomError("delay", "must be a finite number, or 'focus'")
+    return float(value)
+
+
+DelayOrFocus = Annotated[
+    float | Literal["focus"],
+    PlainValidator(_delay_or_focus, json_schema_input_type=float | Literal["focus"]),
+]
+"""A delay [ns], or where to take it from; checked as one, so that messages name the key alone."""
 
 
 class SamplesTable(Checked):
@@ -141,7 +158,7 @@ class SignalTable(SamplesTable):
         description="delays, there and back, that are taken out (an antenna's own mismatch), "
         "counted after cable_delay_ns",
     )
-    cable_delay_ns: float | Literal["focus"] = Field(
+    cable_delay_ns: DelayOrFocus = Field(
         default=0.0,
         description='the delay of all cables in the signal\'s way, there and back; "focus": as '
         "the curvature of the strongest point's wave tells it",
