@@ -52,12 +52,14 @@ def lit_extent(
     places, points = places[inside], points[inside]
     intensity = np.abs(focus(points)) ** 2
     within = np.abs(places) <= np.linalg.norm(end - start) / 2
+    if not within.any():
+        return None
     level = mean_background(intensity[within])
     background = levels(focus, start, end, resolution)[1]
     # Halfway in decibels: the level of a wall varies by tens of them, above all with range.
     halfway = np.sqrt(level * background)
     occupied = np.nonzero(intensity > halfway)[0]
-    if not within.any() or level < background or len(occupied) == 0:
+    if level < background or len(occupied) == 0:
         return None
     runs = np.split(occupied, np.nonzero(np.diff(occupied) > GAP * SAMPLES_PER_CELL)[0] + 1)
     run = max(runs, key=len)
