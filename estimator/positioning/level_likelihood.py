@@ -32,9 +32,9 @@ LEVEL_DEVIATION_DB = 0.1
 0.08 dB over free space at the centre of the band. [dB]"""
 BLOCKED = 0.2
 """Probability that something blocks the straight way to a user whom a mirror shows. [-]"""
-SMOOTH_METAL = 1 / 3
+SMOOTH_METAL = 1 / 4
 """Probability that a mirror is a conductor too smooth to lose anything, and to be seen: a third of
-the materials of the random rooms are metal. [-]"""
+the materials of the random rooms are metal, of which rough ones lose more than 0.1 dB. [-]"""
 TOLD_TO_DB = 1.0
 """Excess beyond which the antenna has a gain, or the receiver is not calibrated: a level then
 tells nothing. [dB]"""

@@ -120,6 +120,9 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
 def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how: Bearing) -> Sight:
     """Look for mirrors between two loose points on the legs of a path beyond its first mirror.
 
+    In the plane only: in space two of the loose points are at some leg by chance too often to mean
+    a mirror, and how often was not measured yet.
+
     Parameters
     ----------
     path
@@ -128,6 +131,8 @@ def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how
         As in :func:`look_along`.
     """
     points = room.unassigned_peaks[:LOOSE_PEAKS]
+    if len(how.coordinates) == 3:
+        return "clear"
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         wall = wall_between(points[first], points[second], room.resolution, how)
         if wall is None or np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:

@@ -35,9 +35,9 @@ def test_the_density_of_levels_integrates_to_one_or_to_what_is_heard_without_an_
 
 
 def test_at_the_level_of_free_space_a_path_is_direct_and_well_below_it_is_a_reflected_one() -> None:
-    # A third of the mirrors are smooth conductors, a fifth of mirrored users are not heard before.
-    assert level_density(0.0, 0) == pytest.approx(15 * level_density(0.0, 1), rel=0.1)
-    assert level_density(0.0, 0) < 4 * level_density(0.0, 1, first=False)
+    # A quarter of the mirrors are smooth metal, a fifth of mirrored users are not heard before.
+    assert level_density(0.0, 0) == pytest.approx(19 * level_density(0.0, 1), rel=0.1)
+    assert level_density(0.0, 0) < 5 * level_density(0.0, 1, first=False)
     assert level_density(-6.0, 1, first=False) > 5 * level_density(-6.0, 0, first=False)
 
 
