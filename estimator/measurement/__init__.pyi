@@ -5,10 +5,10 @@ from .calibration import (
     subtract_background,
     without_frequencies,
 )
-from .focus_delay import FocusDelay, focus_delay
+from .constant_signal import SharedSignal, shared_signal, without_delays, without_shared_signal
+from .delay_by_focus import FocusDelay, focus_delay
 from .frequency_resampling import EqualSteps, to_equal_steps
 from .model import Echo, Measurement, MeasurementError, Uplink, Waves, frequency_step
-from .shared_signal import SharedSignal, shared_signal, without_delays, without_shared_signal
 from .store import is_store, measurement_to_dataset, read_measurement, write_measurement
 
 __all__ = [

@@ -5,8 +5,8 @@ reflection takes some of it. Of a user's antenna nothing is told: it may be isot
 of any gain towards the array. So the density of the excess over free space after n reflections is,
 in decibels,
 
-.. math:: p(e \mid n) = \tfrac12 b_n [(1 - m^n) \mathcal N(e; n \mu, \sigma_0^2 + n \sigma^2)
-          + m^n \mathcal N(e; 0, \sigma_0^2)] + \tfrac12 \mathcal U(e; -40, +25) ,
+.. math:: p(e \mid n) = \tfrac12 b_n [(1 - m^n) N(e; n \mu, \sigma_0^2 + n \sigma^2)
+          + m^n N(e; 0, \sigma_0^2)] + \tfrac12 U(e; -40, +25) ,
 
 with a wall's reflection μ ± σ as :mod:`estimator.prediction.wall_reflection` assumes it. An
 isotropic user whom a mirror shows is heard directly as well, and earlier, unless something blocks

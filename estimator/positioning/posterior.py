@@ -4,14 +4,15 @@ An explanation h says over which mirrors some of the paths come; the others it l
 With the paths' bearings and lengths z, their covariance S (walls' errors in it), a flat prior over
 places u, and the level e of each path,
 
-.. math:: p(h \mid z) \propto \pi_h \Bigl[ \int \mathcal N(z; z_h(u), S)\, \frac{du}{A} \Bigr]
-          \prod_{i \in h} p(e_i \mid n_i) \prod_{i \notin h} \frac{q_i}{\pi L} .
+.. math:: p(h \mid z) \propto \pi_h [ \int N(z; z_h(u), S)\, \frac{du}{A} ]
+          \prod_{i \in h} p(e_i \mid n_i) \prod_{k} \frac{q_k}{\pi L} .
 
-The integral is that of a Gaussian about the least squares solution: paths that agree without need
-weigh a million times what one of them does alone. :math:`\pi_h` is the probability that the rays
-meet the walls' extents as h says. Beside the explanations that the map offers stands *none of
-them*: that a path came over one more mirror, which the map does not show. It weighs by a prior, by
-what the image shows where that mirror would have to be, and by the level: a mirror takes some.
+The second product is over the paths k that are left. The integral is that of a Gaussian about the
+least squares solution: paths that agree without need weigh a million times what one of them does
+alone. :math:`\pi_h` is the probability that the rays meet the walls' extents as h says. Beside the
+explanations that the map offers stands *none of them*: that a path came over one more mirror, which
+the map does not show. It weighs by a prior, by what the image shows where that mirror would have to
+be, and by the level: a mirror takes some.
 """
 
 from collections.abc import Mapping, Sequence

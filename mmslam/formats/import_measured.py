@@ -14,13 +14,13 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.calibration import equalise, remove_path, subtract_background
-from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
-from estimator.measurement.shared_signal import (
+from estimator.measurement.constant_signal import (
     PROPOSED_DB,
     shared_signal,
     without_delays,
     without_shared_signal,
 )
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from mmslam.formats.array_reader import FILES, ArrayReader
 from mmslam.formats.checks.boresight import boresight_of
 from mmslam.formats.checks.focus_check import delay_by_focus, focus_notes

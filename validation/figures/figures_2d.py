@@ -1,5 +1,7 @@
 """Figures: what was imaged, heard and found. Each function draws on an Axes and returns it."""
 
+# Over 400 lines: one plan, with what is drawn on it.
+
 from collections.abc import Iterable, Sequence
 
 import numpy as np

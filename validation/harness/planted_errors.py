@@ -110,8 +110,8 @@ PLANTED = (
     PlantedError(
         name="rough walls hide themselves",
         file="simulator/scene/radio_scene.py",
-        right="rays=build_scene(surfaces, mean=True)",
-        wrong="rays=build_scene(surfaces, mean=False)",
+        right="rays=build_scene(opaque(surfaces, slabs), mean=True)",
+        wrong="rays=build_scene(opaque(surfaces, slabs), mean=False)",
         claims=("full_wave_roughness",),
     ),
     PlantedError(

@@ -48,7 +48,7 @@ def facing_echo(
     positions: Float[np.ndarray, "positions 3"],
     frequencies: Float[np.ndarray, " freqs"],
 ) -> Complex[np.ndarray, "positions freqs"]:
-    r"""Sum the pieces of a surface that faces −y: :math:`\\sum a \\cos\\theta\\, e^{-2jkr} / r^2`.
+    r"""Sum the pieces of a surface that faces −y: :math:`\sum a \cos\theta\, e^{-2jkr} / r^2`.
 
     Frequencies must be uniform: each follows from the one before by a factor for each piece.
     """

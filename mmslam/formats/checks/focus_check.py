@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
-from estimator.measurement.focus_delay import SINGLE, FocusDelay, focus_delay
+from estimator.measurement.delay_by_focus import SINGLE, FocusDelay, focus_delay
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 
 SURE = 4.0

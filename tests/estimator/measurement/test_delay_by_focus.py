@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.measurement.focus_delay import FocusDelay, focus_delay
+from estimator.measurement.delay_by_focus import FocusDelay, focus_delay
 from estimator.measurement.model import Echo, Uplink
 
 BORESIGHT = np.array([0.0, 1.0, 0.0])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from estimator.measurement.model import Echo, MeasurementError
-from estimator.measurement.shared_signal import (
+from estimator.measurement.constant_signal import (
     shared_signal,
     without_delays,
     without_shared_signal,
 )
+from estimator.measurement.model import Echo, MeasurementError
 
 FREQUENCIES = np.linspace(8e9, 12e9, 81)  # [Hz]
 POSITIONS = np.stack([0.01 * np.arange(41) - 0.2, np.zeros(41), np.zeros(41)], axis=1)  # [m]
