@@ -7,12 +7,11 @@ tell that something stands there, but that nothing does.
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.constants import speed_of_light
-from scipy.ndimage import maximum_filter
 
 from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolution
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.peak_detection import MOST_PEAKS, peak_threshold
+from estimator.imaging.peak_detection import peak_threshold, peaks_above
 from estimator.imaging.survey_2d import STEP, Survey
 from estimator.measurement.model import Echo
 
@@ -61,9 +60,7 @@ def peaks_aside(
     taper = survey_weights(echo)
     intensity = np.abs(backproject(echo, points, weights=taper)) ** 2
     threshold = peak_threshold(looked.background, float(np.max(np.abs(looked.values) ** 2)))
-    tops = (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
-    order = np.argsort(-intensity[tops], kind="stable")[:MOST_PEAKS]
-    peaks, levels = points[tops][order], intensity[tops][order]
+    peaks, levels = peaks_above(intensity, points, threshold)
     real: np.ndarray = peaks[~_brighter_elsewhere(echo, peaks, levels)]
     return real
 

@@ -33,11 +33,72 @@ def significant_peaks(
     the image's median.
     """
     threshold = peak_threshold(mean_background(intensity), float(intensity.max()))
-    rows, columns = np.nonzero(
-        (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
-    )
-    order = np.argsort(-intensity[rows, columns], kind="stable")[:MOST_PEAKS]
-    return points[rows[order], columns[order]]
+    return peaks_above(intensity, points, threshold)[0]
+
+
+def peaks_above(
+    intensity: Float[np.ndarray, "*pixels"],
+    points: Float[np.ndarray, "*pixels 3"],
+    threshold: float,
+    *,
+    most: int = MOST_PEAKS,
+) -> tuple[Float[np.ndarray, "peaks 3"], Float[np.ndarray, " peaks"]]:
+    """Return the local maxima above an intensity, strongest first, and their intensities.
+
+    Parameters
+    ----------
+    intensity
+        Squared magnitude of a plane or a volume.
+    points
+        Its pixels. [m]
+    threshold
+        What a maximum must exceed.
+    most
+        How many are returned at the most.
+
+    Returns
+    -------
+    Places and intensities. [m], [-]
+    """
+    tops = (intensity == maximum_filter(intensity, size=3)) & (intensity > threshold)
+    order = np.argsort(-intensity[tops], kind="stable")[:most]
+    return points[tops][order], intensity[tops][order]
+
+
+def vertex_shift(before: float, at: float, after: float) -> float:
+    """Return how far a parabola through three samples has its summit from the middle one.
+
+    Parameters
+    ----------
+    before, at, after
+        Values at equal steps.
+
+    Returns
+    -------
+    In steps; 0 where the parabola has no summit. [-]
+    """
+    bend = before - 2 * at + after
+    return 0.5 * (before - after) / bend if bend < 0 else 0.0
+
+
+def peak_shift(values: Float[np.ndarray, " n"], index: int) -> float:
+    """Return where a parabola through the logarithms around a maximum peaks, from its sample.
+
+    Parameters
+    ----------
+    values
+        Intensities at equal steps.
+    index
+        Of the maximum.
+
+    Returns
+    -------
+    In steps, within half a one; 0 at an end, or beside a zero. [-]
+    """
+    if not 0 < index < values.size - 1 or values[index - 1 : index + 2].min() <= 0:
+        return 0.0
+    before, at, after = np.log(values[index - 1 : index + 2])
+    return float(np.clip(vertex_shift(before, at, after), -0.5, 0.5))
 
 
 def peak_threshold(background: float, highest: float) -> float:

@@ -35,6 +35,12 @@ RANGE_SHIFTS = np.linspace(-0.5, 0.5, 3)
 """Ranges that are tried, about the peak's, whose pixel is 0.75 cells wide. [cells c/2B]"""
 
 
+def over_half_aperture(profiles: RangeProfiles) -> Float[np.ndarray, " channels"]:
+    """Return where each channel is along the array: 0 in its middle, ±1 at the ends. [-]."""
+    across = np.mean(profiles.legs, axis=0)[:, 0]
+    return np.asarray((across - across.mean()) / (0.5 * np.ptp(across)))
+
+
 def bent_intensities(
     profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], resolution: Resolution
 ) -> Float[np.ndarray, "points bends"]:
@@ -53,8 +59,7 @@ def bent_intensities(
     -------
     Largest intensity about each point for each of :data:`BENDS`. [-]
     """
-    across = np.mean(profiles.legs, axis=0)[:, 0]
-    unit = (across - across.mean()) / (0.5 * np.ptp(across))
+    unit = over_half_aperture(profiles)
     # A direction λ/2D aside turns the round trip by half a turn at either end.
     phase = np.pi * SHIFTS[:, None] * unit + BENDS[:, None, None] * unit**2
     tried = np.exp(1j * phase).reshape(-1, unit.size)

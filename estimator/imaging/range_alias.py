@@ -19,7 +19,12 @@ from jaxtyping import Bool, Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution_cell import Resolution
-from estimator.imaging.phase_curvature import RANGE_SHIFTS, SHIFTS, aligned_profiles
+from estimator.imaging.phase_curvature import (
+    RANGE_SHIFTS,
+    SHIFTS,
+    aligned_profiles,
+    over_half_aperture,
+)
 from estimator.imaging.range_compression import RangeProfiles
 
 ORDERS = 3
@@ -111,8 +116,7 @@ def focus_by_range(
         Of the echo.
     """
     across = np.mean(profiles.legs, axis=0)[:, 0]
-    unit = (across - across.mean()) / (0.5 * np.ptp(across))
-    tilts = np.exp(1j * np.pi * SHIFTS[:, None] * unit)
+    tilts = np.exp(1j * np.pi * SHIFTS[:, None] * over_half_aperture(profiles))
     wavenumber = 2 * np.pi * profiles.carrier / speed_of_light
     reach = np.linalg.norm(points, axis=-1, keepdims=True)
     # Of a path of `passes` legs each way; a monostatic echo's profiles end at twice c/2Δf.

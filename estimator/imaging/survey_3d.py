@@ -16,7 +16,12 @@ from scipy.constants import speed_of_light
 from estimator.array.planar_array import PlanarArray, planar_reach, planar_resolution
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.peak_detection import image_contrast, mean_background, peak_threshold
+from estimator.imaging.peak_detection import (
+    image_contrast,
+    mean_background,
+    peak_threshold,
+    peaks_above,
+)
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.measurement.model import Echo
 
@@ -119,9 +124,7 @@ def survey_volume(echo: Echo, array: PlanarArray) -> VolumeSurvey:
     intensity = np.abs(values) ** 2
     background = mean_background(intensity[seen])
     threshold = peak_threshold(background, float(intensity.max()))
-    tops = (intensity == scipy.ndimage.maximum_filter(intensity, size=3)) & (intensity > threshold)
-    order = np.argsort(-intensity[tops], kind="stable")[:MOST_PEAKS]
-    peaks, levels = points[tops][order], intensity[tops][order]
+    peaks, levels = peaks_above(intensity, points, threshold, most=MOST_PEAKS)
     lobe = brighter_elsewhere(echo, array, peaks, levels)
     return VolumeSurvey(
         values=values,
@@ -194,9 +197,7 @@ def peaks_around(
     intensity = np.abs(values) ** 2
     strongest = float(np.max(np.abs(looked.values) ** 2))
     threshold = peak_threshold(looked.background, strongest)
-    tops = (intensity == scipy.ndimage.maximum_filter(intensity, size=3)) & (intensity > threshold)
-    order = np.argsort(-intensity[tops], kind="stable")[:MOST_PEAKS]
-    peaks, levels = points[tops][order], intensity[tops][order]
+    peaks, levels = peaks_above(intensity, points, threshold, most=MOST_PEAKS)
     real: np.ndarray = peaks[~brighter_elsewhere(echo, array, peaks, levels)]
     return real
 

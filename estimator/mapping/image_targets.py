@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from estimator import false_alarm
 from estimator.array.resolution import largest_spacing
 from estimator.imaging.energy_region import cells_at, evenly_chosen, focused, middles
+from estimator.imaging.peak_detection import peak_shift
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Target
@@ -145,21 +146,12 @@ def _between(
     intensity: Float[np.ndarray, "x y z"], axis_places: np.ndarray, place: np.ndarray, axis: int
 ) -> float:
     """Return where a parabola through the logarithms around a maximum peaks. [m]."""
+    line = intensity[tuple(slice(None) if i == axis else int(k) for i, k in enumerate(place))]
     index = int(place[axis])
-    centre = float(axis_places[index])
-    if not 0 < index < axis_places.size - 1:
-        return centre
-    line = [int(i) for i in place]
-    around = []
-    for step in (-1, 0, 1):
-        line[axis] = index + step
-        around.append(float(intensity[tuple(line)]))
-    if min(around) <= 0:
-        return centre
-    before, at, after = np.log(around)
-    bend = before - 2 * at + after
-    shift = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
-    return centre + shift * float(axis_places[1] - axis_places[0])
+    shift = peak_shift(line, index)
+    return float(axis_places[index]) + (
+        shift * float(axis_places[1] - axis_places[0]) if shift else 0.0
+    )
 
 
 def _in_shadow(

@@ -20,7 +20,7 @@ from estimator.geometry.specular_chains import (
 from estimator.geometry.specular_chains_2d import possible_chains
 from estimator.geometry.wall_2d import Wall, crossing, unit_normal
 from estimator.geometry.wall_covariance import place_covariance
-from estimator.imaging.peak_detection import mean_background
+from estimator.imaging.peak_detection import mean_background, peak_shift
 from estimator.imaging.survey_2d import Survey
 from estimator.mapping.diffuse_multipath import between, in_cloud
 from estimator.mapping.wall_unfolding import UnfoldedWalls
@@ -153,8 +153,8 @@ def _spot(
     parts = label(window > REGION * window[inside], structure=np.ones((3, 3)))[0]
     region = parts == parts[inside]
     background = mean_background(window[~region]) if not region.all() else np.inf
-    far = ranges[row] + (ranges[1] - ranges[0]) * _vertex(intensity[:, column], row)
-    sine = sines[column] + (sines[1] - sines[0]) * _vertex(intensity[row], column)
+    far = ranges[row] + (ranges[1] - ranges[0]) * peak_shift(intensity[:, column], row)
+    sine = sines[column] + (sines[1] - sines[0]) * peak_shift(intensity[row], column)
     ends = None
     columns = np.nonzero(region)[1]
     across = np.ptp(sines[low[1] + columns])
@@ -187,15 +187,6 @@ def _ridge(
     """Return the brightest row of a region in some columns."""
     rows: np.ndarray = np.argmax(np.where(region, window, -1.0)[:, columns], axis=0)
     return rows
-
-
-def _vertex(values: Float[np.ndarray, " n"], index: int) -> float:
-    """Return where a parabola through the logarithms of a maximum and its neighbours peaks."""
-    if not 0 < index < values.size - 1 or values[index - 1 : index + 2].min() <= 0:
-        return 0.0
-    before, at, after = np.log(values[index - 1 : index + 2])
-    bend = before - 2 * at + after
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
 
 
 def _at(reach: float, sine: float) -> Float[np.ndarray, " 3"]:

@@ -40,6 +40,14 @@ FIRST_APERTURE = 6.0
 NEAREST = 0.25
 """Of the points that are looked for, over the aperture's extent. [-]"""
 
+BLOCK = 1000
+"""Trials that are summed at once: some ten megabytes. [-]"""
+
+MOST_TRIALS = 100_000
+"""Directions and curvatures of the coarse search: a second of the processor. An array needs more
+only where its spacing is tens of wavelengths over a large aperture, and there aliases of the
+direction agree as well as the truth. [-]"""
+
 SINGLE = 0.7
 """Least coherence C of an echo that is taken for one point's: below, others have a third of its
 power, and the curvature is theirs as well. [-]"""
@@ -69,8 +77,8 @@ def focus_delay(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> Focu
 
     Returns
     -------
-    What curvature and delay say, whether they fit or not; None where no wave stands out or the
-    aperture is too small.
+    What curvature and delay say, whether they fit or not; None where no wave stands out, the
+    aperture is too small, or its positions are too sparse to search (`MOST_TRIALS`).
     """
     if len(data.samples) < 5 or data.frequencies.size < 3:
         return None
@@ -84,8 +92,10 @@ def focus_delay(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> Focu
     while True:
         part = view.part(min(size, whole))
         if len(part.positions) >= 5:
-            place = _coarse(part, whole) if first else _around(part, place)
-            place = _refined(part, place)
+            begin = _coarse(part, whole) if first else _around(part, place)
+            if begin is None:
+                return None
+            place = _refined(part, begin)
             first = False
         if size >= whole:
             break
@@ -166,33 +176,41 @@ class _View:
             transmit=None if self.transmit is None else self.transmit[chosen],
         )
 
-    def paths(self, place: Float[np.ndarray, " unknowns"]) -> Float[np.ndarray, " positions"]:
-        """Return the paths to a place of direction sines and curvature, less the middle's. [m]."""
-        sines, curvature = place[:-1], float(place[-1])
-        sign = 1.0 if curvature >= 0 else -1.0
+    def paths(
+        self, places: Float[np.ndarray, "*trials unknowns"]
+    ) -> Float[np.ndarray, "*trials positions"]:
+        """Return the paths to places of direction sines and curvature, less the middle's. [m]."""
+        sines, curvature = places[..., :-1], places[..., -1:]
+        sign = np.where(curvature >= 0, 1.0, -1.0)
         # Nearly plane: the distances' difference would be lost to rounding.
-        distance = 1 / max(abs(curvature), 1e-6)
-        forward = np.sqrt(max(1 - float(sines @ sines), 0.0))
-        direction = sign * (sines @ self.across) + forward * self.boresight
-        point = distance * direction
-        legs = np.linalg.norm(point - self.positions, axis=1) - distance
+        distance = 1 / np.maximum(np.abs(curvature), 1e-6)
+        forward = np.sqrt(np.maximum(1 - (sines**2).sum(axis=-1, keepdims=True), 0.0))
+        points = distance * (sign * (sines @ self.across) + forward * self.boresight)
+        legs = np.linalg.norm(points[..., None, :] - self.positions, axis=-1) - distance
         if self.ways == 1:
             return np.asarray(sign * legs)
         other = legs
         if self.transmit is not None:
-            other = np.linalg.norm(point - self.transmit, axis=1) - distance
+            other = np.linalg.norm(points[..., None, :] - self.transmit, axis=-1) - distance
         return np.asarray(sign * (legs + other))
 
-    def sums(self, place: Float[np.ndarray, " unknowns"]) -> Complex[np.ndarray, " freqs"]:
+    def sums(
+        self, places: Float[np.ndarray, "*trials unknowns"]
+    ) -> Complex[np.ndarray, "*trials freqs"]:
+        """Return the sums over the positions, focused on each of the places."""
         waves = 2 * np.pi / speed_of_light * self.frequencies
-        turned = self.samples * np.exp(1j * self.paths(place)[:, None] * waves)
-        return np.asarray(turned.sum(axis=0))
+        phases = np.exp(1j * self.paths(places)[..., None] * waves)
+        return np.asarray(np.einsum("...mn,mn->...n", phases, self.samples))
 
-    def coherence(self, place: Float[np.ndarray, " unknowns"]) -> float:
-        if float(place[:-1] @ place[:-1]) >= 1:
-            return 0.0
+    def coherence(
+        self, places: Float[np.ndarray, "*trials unknowns"]
+    ) -> Float[np.ndarray, "*trials"]:
+        """Return C at each of the places; 0 outside the half space."""
         power = len(self.positions) * float((np.abs(self.samples) ** 2).sum())
-        return float((np.abs(self.sums(place)) ** 2).sum()) / power if power > 0 else 0.0
+        if power <= 0:
+            return np.zeros(places.shape[:-1])
+        values = (np.abs(self.sums(places)) ** 2).sum(axis=-1) / power
+        return np.where((places[..., :-1] ** 2).sum(axis=-1) < 1, values, 0.0)
 
     def cell(self) -> Float[np.ndarray, " unknowns"]:
         """Return the resolution in direction sine and curvature."""
@@ -201,16 +219,20 @@ class _View:
         return np.append(wave / self.ways / extents, 4 * wave / self.ways / extents.max() ** 2)
 
 
-def _coarse(view: _View, whole: float) -> Float[np.ndarray, " unknowns"]:
+def _coarse(view: _View, whole: float) -> Float[np.ndarray, " unknowns"] | None:
     """Search all directions and curvatures of a small part of the whole aperture [m]."""
     cell = view.cell()
-    lines = [np.arange(-0.95, 0.95, one / 1.5) for one in cell[:-1]]
     most = 1 / (NEAREST * whole)
     steps = int(np.ceil(most / cell[-1]))
+    count = (2 * steps + 1) * float(np.prod(np.ceil(1.9 * 1.5 / cell[:-1])))
+    if count > MOST_TRIALS:
+        return None
+    lines = [np.arange(-0.95, 0.95, one / 1.5) for one in cell[:-1]]
     lines.append(cell[-1] * np.arange(-steps, steps + 1))
     places = np.stack([one.ravel() for one in np.meshgrid(*lines, indexing="ij")], axis=-1)
     few = view.thinned(-(-len(view.positions) // FEW[0]), -(-view.frequencies.size // FEW[1]))
-    values = np.array([few.coherence(place) for place in places])
+    blocks = np.array_split(places, -(-len(places) // BLOCK))
+    values = np.concatenate([few.coherence(block) for block in blocks])
     return np.asarray(places[int(np.argmax(values))])
 
 
@@ -220,14 +242,14 @@ def _around(view: _View, place: Float[np.ndarray, " unknowns"]) -> Float[np.ndar
     shifts = [(-1.0, 0.0, 1.0)] * (len(place) - 1) + [(-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)]
     offsets = np.stack([one.ravel() for one in np.meshgrid(*shifts, indexing="ij")], axis=-1)
     places = place + offsets * cell * 0.75
-    return np.asarray(places[int(np.argmax([view.coherence(one) for one in places]))])
+    return np.asarray(places[int(np.argmax(view.coherence(places)))])
 
 
 def _refined(view: _View, place: Float[np.ndarray, " unknowns"]) -> Float[np.ndarray, " unknowns"]:
     cell = view.cell()
 
     def loss(shift: Float[np.ndarray, " unknowns"]) -> float:
-        return -view.coherence(place + shift * cell)
+        return -float(view.coherence(place + shift * cell))
 
     found = scipy.optimize.minimize(
         loss,
@@ -253,7 +275,7 @@ def _judged(view: _View, place: Float[np.ndarray, " unknowns"], data: Echo | Upl
     excess = (path - expected + around / 2) % around - around / 2 if curvature else np.nan
     spread = view.ways * deviation / curvature**2 if curvature else np.inf
     return FocusDelay(
-        coherence=view.coherence(place),
+        coherence=float(view.coherence(place)),
         curvature=curvature,
         curvature_deviation=deviation,
         path=path,

@@ -24,6 +24,7 @@ from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_sampling import trial_points
 from estimator.walls.scatterer_row import (
     adjoint,
+    every_nth,
     factorized,
     row_echoes,
     row_places,
@@ -81,14 +82,7 @@ def _explained(echo: Echo, line: FittedLine, resolution: Resolution) -> float:
     half = 0.5 * min(line.length, MOST_CELLS * cell) * line.direction
     start, end = line.middle - half, line.middle + half
     every = max(1, int(np.ceil(len(echo.positions) / MOST_POSITIONS)))
-    few = Echo(
-        samples=echo.samples[::every],
-        positions=echo.positions[::every],
-        frequencies=echo.frequencies,
-        transmit_positions=None
-        if echo.transmit_positions is None
-        else echo.transmit_positions[::every],
-    )
+    few = every_nth(echo, every)
     places = row_places(few, start, end, (BEYOND * cell, BEYOND * cell))
     row = line.middle + places[:, None] * line.direction
     profiles = row_profiles(few, start, end)

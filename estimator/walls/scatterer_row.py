@@ -109,6 +109,11 @@ def thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, "
     spacing = float(np.ptp(x)) / max(1, len(x) - 1)
     every = int(wavelength / (2 * SECTOR_MARGIN * max(span, 1e-6) * max(spacing, 1e-9)))
     every = max(1, min(every, len(x) // FEWEST_POSITIONS))
+    return every_nth(echo, every)
+
+
+def every_nth(echo: Echo, every: int) -> Echo:
+    """Keep one of so many antenna positions."""
     return Echo(
         samples=echo.samples[::every],
         positions=echo.positions[::every],

@@ -13,12 +13,11 @@ import scipy.fft
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
+from estimator.imaging.peak_detection import vertex_shift
 from estimator.imaging.range_compression import unambiguous_path
+from estimator.measurement.constant_signal import PROPOSED_DB
 from estimator.measurement.model import Echo
 
-DOMINATES = 100.0
-"""Energy of the constant over that of the rest from which it is taken out: its sidelobes, −13 dB
-and falling, hide what is weaker than that (20 dB). [-]"""
 FEWEST = 8
 """Positions of which a mean tells anything. [-]"""
 ONE_DELAY = 0.95
@@ -59,7 +58,7 @@ def without_constant(echo: Echo) -> SharedConstant:
     rest = echo.samples - constant
     shared = float(np.vdot(constant, constant).real) * len(rest)
     varying = max(float(np.vdot(rest, rest).real), 1e-30 * shared)
-    if len(rest) < FEWEST or shared < DOMINATES * varying:
+    if len(rest) < FEWEST or shared < 10 ** (PROPOSED_DB / 10) * varying:
         return SharedConstant(echo=echo)
     distance, explained, deviation = _one_delay(constant, echo.frequencies)
     half = 0.5 * float(np.linalg.norm(np.ptp(echo.positions, axis=0)))
@@ -134,8 +133,7 @@ def _profile(
 
 def _summit(magnitude: Float[np.ndarray, " cells"], top: int) -> float:
     before, at, after = (magnitude[(top + i) % magnitude.size] for i in (-1, 0, 1))
-    bend = before - 2 * at + after
-    return top + (float(0.5 * (before - after) / bend) if bend < 0 else 0.0)
+    return top + float(vertex_shift(before, at, after))
 
 
 def _multiples(

@@ -242,8 +242,7 @@ def _shapes(path: Path, element: ElementTree.Element, names: _Names) -> Iterator
     children = names.groups[group].findall("shape")
     name = _key(element.get("id", group).removeprefix("mesh-"))
     for number, child in enumerate(children):
-        if known_kind(path, child, (*FORMATS, *UNIT_SHAPES)) not in SHAPES:
-            continue
+        known_kind(path, child, (*FORMATS, *UNIT_SHAPES))  # no groups within groups
         shape = _shape(path, child, names)
         whole = placed @ np.vstack([shape.to_world, [0.0, 0.0, 0.0, 1.0]])
         yield ForeignShape(

@@ -24,7 +24,7 @@ References
 .. [1] M. Born and E. Wolf, "Principles of Optics", 7th ed., 1999, 1.6.4 and 7.6.1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -148,9 +148,7 @@ def through_slabs(
         Whether the wave spreads in the plane only.
     """
     bent, total = _common(crossings, directions, lengths, frequencies, cylindrical=cylindrical)
-    for material, normal in crossings:
-        cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
-        both = inserted(material, frequencies, cosines)
+    for both, _ in _in_turn(crossings, bent, frequencies):
         total *= both.te if vertical else both.tm
     return total
 
@@ -174,9 +172,7 @@ def transported_through(
         What would be there without them.
     """
     bent, common = _common(crossings, directions, lengths, frequencies, cylindrical=False)
-    for material, normal in crossings:
-        cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
-        both = inserted(material, frequencies, cosines)
+    for both, normal in _in_turn(crossings, bent, frequencies):
         across = across_plane(directions, normal)
         part = (both.te - both.tm) * np.einsum("rfx,rx->rf", field, across)
         field = both.tm[..., None] * field + part[..., None] * across[:, None]
@@ -204,9 +200,7 @@ def along_field(
         Unit vectors across the rays.
     """
     bent, total = _common(crossings, directions, lengths, frequencies, cylindrical=False)
-    for material, normal in crossings:
-        cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
-        both = inserted(material, frequencies, cosines)
+    for both, normal in _in_turn(crossings, bent, frequencies):
         share = np.einsum("rx,rx->r", field, across_plane(directions, normal))[:, None] ** 2
         total *= both.tm + (both.te - both.tm) * share
     return total
@@ -219,6 +213,15 @@ def across_plane(
     across = np.cross(directions, normal)
     size = np.sqrt(np.einsum("rx,rx->r", across, across))[:, None]
     return np.asarray(np.divide(across, size, out=np.zeros_like(across), where=size > PARALLEL))
+
+
+def _in_turn(
+    crossings: Sequence[Crossing], bent: Bent, frequencies: Float[np.ndarray, " freqs"]
+) -> Iterator[tuple[Coefficients, Float[np.ndarray, " 3"]]]:
+    """Yield what each slab inserts into bent rays [rays, freqs], and its normal."""
+    for material, normal in crossings:
+        cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
+        yield inserted(material, frequencies, cosines), normal
 
 
 def _common(

@@ -59,6 +59,8 @@ def cut(name: str, *, points: int, elements: int, most_facets: int) -> list[str]
         cuts.append(f"base_station.elements=[{min(side, along)}, {min(side, up)}]")
     elif whole.base_station.elements is not None:
         cuts.append(f"base_station.elements={min(elements, along)}")
+    if whole.dimensions == 3 and len(whole.objects) > 4:
+        cuts.append("max_bounces=1")  # chains of two over so many walls take a minute
     share = most_facets / max(facets(whole), 1)
     scale = min(1.0, share if whole.dimensions == 2 else math.sqrt(share))
     for key, body in whole.objects.items():

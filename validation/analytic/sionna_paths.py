@@ -6,10 +6,10 @@ single precision, Mitsuba's intersections.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import epsilon_0, speed_of_light
 from scipy.spatial.transform import Rotation
 
@@ -213,8 +213,29 @@ def solver_scene(scene: RandomScene) -> tuple[Any, list[Any]]:
     return theirs, bodies
 
 
-def solver_paths(scene: RandomScene) -> Paths:
-    """Let the path solver find the paths of up to three bounces."""
+class Solved(NamedTuple):
+    """What the path solver found; the two antennas and the source are single."""
+
+    bodies: list[Any]  # as the scene's objects
+    valid: Bool[np.ndarray, "receivers paths"]
+    delays: Float[np.ndarray, "receivers paths"]  # [s]
+    amplitudes: Complex[np.ndarray, "receivers paths"]  # [-]
+    kinds: np.ndarray  # of interaction, [depth, receivers, paths]; 0 beyond the last
+    shapes: np.ndarray  # body of each
+    triangles: np.ndarray  # and which of its triangles
+    vertices: np.ndarray  # and where, with x, y, z last [m]
+
+    def points(
+        self, scene: RandomScene, receiver: int, index: int
+    ) -> Float[np.ndarray, "points 3"]:
+        """Return a path from the source over what it meets to the receiver. [m]."""
+        depth = int(np.count_nonzero(self.kinds[:, receiver, index]))
+        hits = self.vertices[:depth, receiver, index].astype(float)
+        return np.array([scene.points[0], *hits, scene.points[1 + receiver]])
+
+
+def solved(scene: RandomScene, *, max_depth: int, refraction: bool) -> Solved:
+    """Run the path solver on a scene."""
     import sionna.rt as rt
 
     theirs, bodies = solver_scene(scene)
@@ -223,45 +244,49 @@ def solver_paths(scene: RandomScene) -> Paths:
         theirs.add(rt.Receiver(f"receiver-{index}", position=point.tolist()))
     paths = rt.PathSolver(deterministic=True)(
         theirs,
-        max_depth=3,
+        max_depth=max_depth,
         samples_per_src=RAYS,
         los=True,
         specular_reflection=True,
         diffuse_reflection=False,
-        refraction=False,
+        refraction=refraction,
         synthetic_array=False,
         seed=1,
     )
-    first_face = dict(
-        zip(
-            [body.object_id for body in bodies],
-            np.cumsum([0, *map(len, scene.objects[:-1])]).tolist(),
-            strict=True,
-        )
-    )
-    # Receiver and path; the two antennas and the source are single.
     valid, delays = (field.numpy()[:, 0, 0, 0] for field in (paths.valid, paths.tau))
     amplitudes = (paths.a[0].numpy() + 1j * paths.a[1].numpy())[:, 0, 0, 0]
     kinds, shapes, triangles, vertices = (
         field.numpy()[:, :, 0, 0, 0]
         for field in (paths.interactions, paths.objects, paths.primitives, paths.vertices)
     )
-    found = {}
-    for receiver, index in zip(*np.nonzero(valid), strict=True):
-        depth = int(np.count_nonzero(kinds[:, receiver, index]))
-        sequence = tuple(
-            first_face[int(shapes[bounce, receiver, index])]
-            + int(triangles[bounce, receiver, index]) // 2
-            for bounce in range(depth)
+    return Solved(bodies, valid, delays, amplitudes, kinds, shapes, triangles, vertices)
+
+
+def solver_paths(scene: RandomScene) -> Paths:
+    """Let the path solver find the paths of up to three bounces."""
+    them = solved(scene, max_depth=3, refraction=False)
+    first_face = dict(
+        zip(
+            [body.object_id for body in them.bodies],
+            np.cumsum([0, *map(len, scene.objects[:-1])]).tolist(),
+            strict=True,
         )
-        hits = vertices[:depth, receiver, index].astype(float)
-        key = (int(receiver), sequence)
+    )
+    found = {}
+    for receiver, index in np.argwhere(them.valid).tolist():
+        points = them.points(scene, receiver, index)
+        sequence = tuple(
+            first_face[int(them.shapes[bounce, receiver, index])]
+            + int(them.triangles[bounce, receiver, index]) // 2
+            for bounce in range(len(points) - 2)
+        )
+        key = (receiver, sequence)
         if key in found:
             raise ValueError(f"the path solver has found the chain {key} twice")
         found[key] = Path(
-            float(delays[receiver, index]) * speed_of_light,
-            complex(amplitudes[receiver, index]),
-            np.array([scene.points[0], *hits, scene.points[1 + receiver]]),
+            float(them.delays[receiver, index]) * speed_of_light,
+            complex(them.amplitudes[receiver, index]),
+            points,
         )
     return found
 

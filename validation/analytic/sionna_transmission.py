@@ -18,14 +18,13 @@ from simulator.specular.path_field import specular_response
 from validation.analytic.sionna_paths import (
     EDGE,
     FREQUENCY,
-    RAYS,
     SHORTEST_LEG,
     THICKNESS,
     Path,
     RandomScene,
     distance_from_edges,
     random_scene,
-    solver_scene,
+    solved,
 )
 
 REFRACTION = 4
@@ -96,44 +95,20 @@ def our_paths(scene: RandomScene) -> Paths:
 
 def solver_paths(scene: RandomScene) -> Paths:
     """Let the path solver find the paths, with refraction."""
-    import sionna.rt as rt
-
-    theirs, bodies = solver_scene(scene)
-    theirs.add(rt.Transmitter("source", position=scene.points[0].tolist()))
-    for index, point in enumerate(scene.points[1:]):
-        theirs.add(rt.Receiver(f"receiver-{index}", position=point.tolist()))
-    paths = rt.PathSolver(deterministic=True)(
-        theirs,
-        max_depth=MOST_MET,
-        samples_per_src=RAYS,
-        los=True,
-        specular_reflection=True,
-        diffuse_reflection=False,
-        refraction=True,
-        synthetic_array=False,
-        seed=1,
-    )
-    plate = {body.object_id: index for index, body in enumerate(bodies)}
-    valid, delays = (field.numpy()[:, 0, 0, 0] for field in (paths.valid, paths.tau))
-    amplitudes = (paths.a[0].numpy() + 1j * paths.a[1].numpy())[:, 0, 0, 0]
-    kinds, shapes, vertices = (
-        field.numpy()[:, :, 0, 0, 0]
-        for field in (paths.interactions, paths.objects, paths.vertices)
-    )
+    them = solved(scene, max_depth=MOST_MET, refraction=True)
+    plate = {body.object_id: index for index, body in enumerate(them.bodies)}
     found: Paths = {}
-    for receiver, index in zip(*np.nonzero(valid), strict=True):
-        depth = int(np.count_nonzero(kinds[:, receiver, index]))
+    for receiver, index in np.argwhere(them.valid).tolist():
+        points = them.points(scene, receiver, index)
         met = tuple(
             (
-                plate[int(shapes[step, receiver, index])],
-                bool(kinds[step, receiver, index] == REFRACTION),
+                plate[int(them.shapes[step, receiver, index])],
+                bool(them.kinds[step, receiver, index] == REFRACTION),
             )
-            for step in range(depth)
+            for step in range(len(points) - 2)
         )
-        hits = vertices[:depth, receiver, index].astype(float)
-        points = np.array([scene.points[0], *hits, scene.points[1 + receiver]])
-        length = float(delays[receiver, index]) * speed_of_light
-        found[int(receiver), met] = Path(length, complex(amplitudes[receiver, index]), points)
+        length = float(them.delays[receiver, index]) * speed_of_light
+        found[receiver, met] = Path(length, complex(them.amplitudes[receiver, index]), points)
     return found
 
 

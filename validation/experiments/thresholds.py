@@ -67,7 +67,7 @@ SCANS = (
     Scan(module="estimator.walls.line_extent", name="END_LEVEL", values=(0.03, 0.2)),
     Scan(module="estimator.walls.line_fit_image", name="SUMMIT", values=(0.4, 0.8)),
     Scan(module="estimator.walls.line_fit_image", name="LEAST_RISE", values=(0.9, 1.0)),
-    Scan(module="estimator.walls.line_fit_echo", name="OVERSAMPLING", values=(1.0, 1.5)),
+    Scan(module="estimator.walls.scatterer_row", name="OVERSAMPLING", values=(1.0, 1.5)),
     Scan(module="estimator.walls.line_refinement", name="CUT_SHARE", values=(0.1, 0.6)),
     Scan(module="estimator.walls.line_relations", name="BESIDE", values=(1.5, 3.0)),
     Scan(module="estimator.walls.line_relations", name="BEYOND_END", values=(2.0, 8.0)),

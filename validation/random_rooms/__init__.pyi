@@ -1,4 +1,4 @@
-from .judging import judge_room, judge_rooms, measured_room, read_scores, write_scores
+from .judging import judge_room, judge_rooms, measured_room, write_scores
 from .oracle import Answerable, ask_oracle, shown_walls, true_paths
 from .prior import SEEDS, SETS, draw_room
 from .room_pictures import draw_rooms
@@ -17,7 +17,6 @@ __all__ = [
     "judge_room",
     "judge_rooms",
     "measured_room",
-    "read_scores",
     "score_room",
     "shown_walls",
     "summarise",

@@ -116,19 +116,3 @@ def write_scores(path: Path, scores: Sequence[RoomScore]) -> None:
     """Keep scores as JSON, one room a line."""
     lines = ",\n".join(json.dumps(asdict(score)) for score in scores)
     path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
-
-
-def read_scores(path: Path) -> tuple[RoomScore, ...]:
-    """Read scores that were kept."""
-    rooms = json.loads(path.read_text(encoding="utf-8"))
-    listed = ("shown", "found", "wall_squares")
-    return tuple(
-        RoomScore(
-            **{
-                **room,
-                **{key: tuple(room[key]) for key in listed},
-                "stated": tuple((float(p), bool(held)) for p, held in room["stated"]),
-            }
-        )
-        for room in rooms
-    )

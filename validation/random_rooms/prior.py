@@ -172,12 +172,7 @@ def _flat_room(
             "radius_m": round(size * rng.uniform(0.003, 0.012), 4),
         }
     user: Tables = {"position_m": _place(rng, (-0.5, 0.1), (0.5, 0.8), size)}
-    if rng.random() < 0.5:
-        user["antenna"] = {
-            "kind": "gaussian_beam",
-            "sigma_rad": _rounded(rng, 0.08, 0.5, 3),
-            "aim": str(rng.choice(plates)),
-        }
+    user |= _antenna(rng, plates, narrowest=0.08)
     return {
         "dimensions": 2,
         "max_bounces": bounces,
@@ -212,12 +207,7 @@ def _space(rng: np.random.Generator) -> Tables:
             _rounded(rng, -0.1, 0.1, 4),
         ]
     }
-    if rng.random() < 0.5:
-        user["antenna"] = {
-            "kind": "gaussian_beam",
-            "sigma_rad": _rounded(rng, 0.15, 0.5, 3),
-            "aim": str(rng.choice(plates)),
-        }
+    user |= _antenna(rng, plates, narrowest=0.15)
     return {
         "dimensions": 3,
         "max_bounces": 1,
@@ -227,6 +217,18 @@ def _space(rng: np.random.Generator) -> Tables:
         "users": {USER: user},
         "noise": {"snr_db": _rounded(rng, 0.0, 30.0, 1)},
     }
+
+
+def _antenna(rng: np.random.Generator, plates: list[str], *, narrowest: float) -> Tables:
+    """Draw a beam of at least that width [rad] at one of the walls, or none: isotropic."""
+    if rng.random() >= 0.5:
+        return {}
+    beam = {
+        "kind": "gaussian_beam",
+        "sigma_rad": _rounded(rng, narrowest, 0.5, 3),
+        "aim": str(rng.choice(plates)),
+    }
+    return {"antenna": beam}
 
 
 def _centre(rng: np.random.Generator, size: float = 1.0) -> list[float]:

@@ -55,13 +55,13 @@ def test_a_post_beside_its_place_is_told(posts: HiddenImaging) -> None:
     first, second = posts.targets
     near = replace(first, range_error=-2e-3, across_error=1.1 * first.cell_across)
     assert failed(replace(posts, targets=(near, second))) == [
-        "folded front faces along range", "folded front faces across",
+        "unfolded front faces along range", "unfolded front faces across",
     ]  # fmt: skip
 
 
 def test_nothing_found_fails_instead_of_passing_for_want_of_errors(posts: HiddenImaging) -> None:
     nothing = replace(posts, targets=(), missed=("far_post", "near_post"))
-    assert "folded front faces along range" in failed(nothing)
+    assert "unfolded front faces along range" in failed(nothing)
 
 
 def test_raw_and_unfolded_image_are_drawn_in_metres(posts: HiddenImaging) -> None:

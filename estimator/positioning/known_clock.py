@@ -1,0 +1,168 @@
+"""A user on the base station's clock: the place that holds the posterior, or all that share it.
+
+:mod:`estimator.positioning.posterior` weighs all consistent hypotheses, and that the truth is none
+of them. A place that holds 0.999 of the posterior is the answer, paths that it does not explain are
+dropped; else it is ambiguous, and all places are told with their probabilities.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from estimator.channel.path import Path, PathSet
+from estimator.geometry.bearing import Bearing
+from estimator.geometry.specular_chains import Chain
+from estimator.positioning.hypotheses import Chains, consistent_ones, end_reach, same_place
+from estimator.positioning.los_check import StraightWay, look_along, look_along_legs
+from estimator.positioning.map_context import MapContext
+from estimator.positioning.position_report import ambiguous, path_reports, placed
+from estimator.positioning.posterior import (
+    CERTAIN,
+    chain_probabilities,
+    log_weight,
+    strong_unexplained,
+    unseen_odds,
+)
+from estimator.positioning.weighted_least_squares import Consensus
+from estimator.results.estimate import UserEstimate
+
+NEGLIGIBLE = 1e-6
+"""Probability of a place below which it is not named. [-]"""
+UNSEEN_SOMEWHERE = (
+    "the path is weaker than a direct one, or comes from where little is shown: a wall that the "
+    "image does not show may have reflected it"
+)
+UNSEEN_BEYOND = (
+    "beyond the wall the path passes between two points that may be the ends of another wall, too "
+    "smooth to be seen"
+)
+
+
+def on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
+    """Locate a user whose delays are lengths.
+
+    Parameters
+    ----------
+    name, found, room
+        As for :func:`estimator.positioning.decision_rules.decide`.
+    """
+    specular = [index for index, path in enumerate(found.paths) if path.specular]
+    scattered = [path for path in found.paths if not path.specular]
+    energy = sum(found.paths[index].share for index in specular)
+    if sum(path.share for path in scattered) > energy:
+        strongest = max(scattered, key=lambda path: path.share)
+        return UserEstimate(
+            name=name,
+            status="not_found",
+            reason=_why_none(strongest, found.how),
+            paths=path_reports(found, (), {}),
+        )
+    chances = {
+        index: chain_probabilities(
+            found.paths[index].wave.path_length,
+            found.paths[index],
+            room,
+            found,
+            end_reach(found.paths[index], room),
+        )
+        for index in specular
+    }
+    chains = {index: _ordered(some) for index, some in chances.items()}
+    consistent = consistent_ones(chains, found, room)
+    return _decided(name, consistent, found, room, chains, chances)
+
+
+def _decided(
+    name: str,
+    consistent: Sequence[Consensus],
+    found: PathSet,
+    room: MapContext,
+    chains: Chains,
+    chances: Mapping[int, Mapping[Chain, float]],
+) -> UserEstimate:
+    """Answer by the posterior over all explanations, and that it is none of them."""
+    logs = [log_weight(one, found, room, chances) for one in consistent]
+    ways: dict[int, StraightWay] = {}
+    odds = []
+    for number, one in enumerate(consistent):
+        odds.append(0.0)
+        if len(one.sightings) > 1 or logs[number] < max(logs) + np.log(NEGLIGIBLE):
+            continue
+        alone = placed(name, one, found, room, chains)
+        (only,) = one.sightings
+        if only.chain:
+            assert alone.path is not None
+            sight = look_along_legs(alone.path, room, found.how)
+            way = StraightWay(sight=sight, doubt=None if sight == "clear" else UNSEEN_BEYOND)
+        else:
+            way = look_along(alone, found.paths[only.path].wave, room, found.how)
+        ways[number] = way
+        odds[-1] = unseen_odds(one, found, room, way.sight)
+    weights = np.exp(np.array(logs) - max(logs))
+    total = float((weights * (1 + np.array(odds))).sum())
+    places = _places(consistent, weights / total, found.how)
+    best, probability = places[0]
+    answer = replace(placed(name, consistent[best], found, room, chains), probability=probability)
+    if probability >= CERTAIN:
+        return answer
+    others = [
+        replace(placed(name, consistent[index], found, room, chains), probability=share)
+        for index, share in places[1:]
+        if share > NEGLIGIBLE
+    ]
+    unseen = float(weights[best] * odds[best] / total)
+    elsewhere = ways[best].otherwise if best in ways else None
+    if elsewhere is not None and unseen > NEGLIGIBLE:
+        others.append(replace(elsewhere, probability=unseen))
+    contradicted = strong_unexplained(consistent[best], found, room)
+    elsewhere_too = sum(share for _, share in places[1:])
+    if best in ways and unseen >= elsewhere_too and not contradicted:
+        doubt = ways[best].doubt or UNSEEN_SOMEWHERE
+        return replace(ambiguous(answer, doubt, others), line_of_sight=None)
+    paths = {one.path for one in consistent[best].sightings}
+    same = all(
+        {one.path for one in consistent[index].sightings} <= paths
+        for index, share in places[1:]
+        if share > NEGLIGIBLE
+    )
+    reason = "paths of like strength end at different places"
+    if same and len(paths) > 1:
+        reason = "the same paths agree over other walls as well"
+    elif same and not contradicted:
+        reason = "the path meets a wall at its very end: it may pass beside it"
+    return ambiguous(answer, reason, others)
+
+
+def _places(
+    consistent: Sequence[Consensus], shares: Float[np.ndarray, " weights"], how: Bearing
+) -> list[tuple[int, float]]:
+    """Put explanations of one place together: the likeliest of each, and their probability."""
+    places: list[tuple[int, float]] = []
+    for index in np.argsort(-shares, kind="stable"):
+        for number, (first, share) in enumerate(places):
+            if same_place(consistent[first], consistent[index], how):
+                places[number] = (first, share + float(shares[index]))
+                break
+        else:
+            places.append((int(index), float(shares[index])))
+    return sorted(places, key=lambda place: -place[1])
+
+
+def _ordered(chances: Mapping[Chain, float]) -> tuple[Chain, ...]:
+    return tuple(sorted(chances, key=lambda chain: -chances[chain]))
+
+
+def _why_none(path: Path, how: Bearing) -> str:
+    where = f"{how.told(path.wave.bearing)}, {path.wave.path_length:.3f} m"
+    if (length := path.dealiased_length) is not None:
+        return (
+            f"the path at {where} has the curvature of one {length:.2f} m long, beyond the "
+            f"unambiguous {path.unambiguous:.2f} m; take smaller frequency steps"
+        )
+    return (
+        f"the strongest wave ({where}) comes from a point about {path.radius:.2f} m away, "
+        "not over that length: an edge or rough patch scatters it, and no mirror-like or direct "
+        "path stands out; or the clocks differ"
+    )
