@@ -12,6 +12,14 @@ from estimator.results.estimate import AngleRangeMap
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 Y_AXIS = np.array([0.0, 1.0, 0.0])
+SAMPLES = 3.0
+"""Samples for each −3 dB width of a map that is shown: 0.3 dB of a peak are lost at most, between
+two of them. [-]"""
+DECIMALS = 9
+"""Decimals to which places along the axis are told apart: a nanometre is rounding. [decimals of m]
+"""
+SHORTEST = 1e-9
+"""Least length of a vector that has a direction. [-]"""
 
 
 def angle_range_map(
@@ -94,7 +102,7 @@ def polar_points(
 
 
 def default_angles(
-    uplink: Uplink, *, axis: Float[np.ndarray, " 3"] = X_AXIS, cells: float = 3.0
+    uplink: Uplink, *, axis: Float[np.ndarray, " 3"] = X_AXIS, cells: float = SAMPLES
 ) -> Float[np.ndarray, " angles"]:
     r"""Sample the sector in which the array's angles are unambiguous, uniformly in cos θ.
 
@@ -119,7 +127,7 @@ def default_angles(
     MeasurementError
         If all elements lie at one place along the axis.
     """
-    along = np.unique(np.round(uplink.positions @ _unit("axis", axis), 9))
+    along = np.unique(np.round(uplink.positions @ _unit("axis", axis), DECIMALS))
     if along.size < 2:
         raise MeasurementError(
             "the elements all lie at one place along the axis; an angle needs an aperture"
@@ -133,7 +141,7 @@ def default_angles(
 
 
 def default_path_lengths(
-    uplink: Uplink, *, longest: float | None = None, cells: float = 3.0
+    uplink: Uplink, *, longest: float | None = None, cells: float = SAMPLES
 ) -> Float[np.ndarray, " ranges"]:
     """Sample path lengths from one cell up to the unambiguous path c/Δf.
 
@@ -175,6 +183,6 @@ def default_path_lengths(
 
 def _unit(name: str, vector: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
     length = float(np.linalg.norm(vector))
-    if not length > 1e-9:
+    if not length > SHORTEST:
         raise MeasurementError(f"{name} has length {length:g}; it must have a direction")
     return np.asarray(vector / length, dtype=np.float64)

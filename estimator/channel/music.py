@@ -14,6 +14,19 @@ from scipy.constants import speed_of_light
 from estimator.channel.angle_range_map_2d import X_AXIS, Y_AXIS, polar_points
 from estimator.measurement.model import MeasurementError, Uplink
 
+SUBARRAY = (2, 3)
+"""Elements of each shifted part over all, as a fraction: the part keeps most of the aperture,
+and the shifts, forward and backward, restore the rank of two thirds as many paths as there are
+elements. Chosen, not measured. [-]"""
+LEAST_OUTSIDE = 1e-15
+"""Least share of a steering vector in the noise space, about float64's rounding: the spectrum stays
+finite. [-]"""
+UNEVEN = 1e-3
+"""Deviation of a spacing over their mean up to which an array is uniform: a phase of 3e-3 rad at
+half a wavelength. [-]"""
+SPACING = 0.5
+"""Distance of path lengths whose waves span those between two limits: two a cell, so that lengths
+between them are spanned as well. [cells c/B]"""
 FREQUENCIES = 64
 """Frequencies that are used, evenly over the sweep: more gain little. [-]"""
 
@@ -64,7 +77,7 @@ def music_spectrum(
     order = np.argsort(along)
     spacing = _uniform_spacing(along[order])
     count = along.size
-    part = subarray if subarray is not None else 2 * count // 3
+    part = subarray if subarray is not None else SUBARRAY[0] * count // SUBARRAY[1]
     if not (0 < paths < part <= count) or 2 * (count - part + 1) < paths:
         raise MeasurementError(
             f"{count} elements in parts of {part} cannot tell {paths} paths apart; the parts need "
@@ -93,7 +106,7 @@ def music_spectrum(
             1j * wavenumber * spacing * np.outer(np.cos(aoa), np.arange(part) - (part - 1) / 2)
         )
         inside = (np.abs(steering @ signal.conj().T) ** 2).sum(axis=1) / part
-        share += np.maximum(1 - inside, 1e-15)
+        share += np.maximum(1 - inside, LEAST_OUTSIDE)
     return np.asarray(frequencies.size / share)
 
 
@@ -102,8 +115,7 @@ def _uniform_spacing(along: Float[np.ndarray, " elements"]) -> float:
         raise MeasurementError(f"{along.size} elements; MUSIC needs at least three")
     steps = np.diff(along)
     spacing = float(steps.mean())
-    # A thousandth of the spacing is a phase of 3e-3 at half a wavelength.
-    if not spacing > 0 or np.abs(steps - spacing).max() > 1e-3 * spacing:
+    if not spacing > 0 or np.abs(steps - spacing).max() > UNEVEN * spacing:
         raise MeasurementError(
             f"elements are {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} mm apart along the "
             "axis; smoothing needs a uniform linear array"
@@ -125,7 +137,7 @@ def _selected(
                 f"({speed_of_light / bandwidth:.3g} m)"
             )
         # Projection onto the lengths' own waves, over the same frequencies: no new grid.
-        cells = np.arange(low, high, 0.5 * speed_of_light / bandwidth)
+        cells = np.arange(low, high, SPACING * speed_of_light / bandwidth)
         basis = np.exp(-2j * np.pi * np.outer(frequencies, cells) / speed_of_light)
         q = np.linalg.qr(basis)[0]
         samples = (samples @ q.conj()) @ q.T

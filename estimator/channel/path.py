@@ -14,12 +14,13 @@ from estimator.geometry.bearing import Bearing
 from estimator.geometry.bearing_2d import LINEAR
 
 MOST_PATHS = 4
-"""Waves that are taken out of one pilot: each choice of them and of the walls is a hypothesis."""
+"""Waves that are taken out of one pilot: each choice of them and of the walls is a hypothesis.
+[-]"""
 LEAST_SHARE = 0.05
 """Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the covariance is an estimate from few
-modes or tiles itself, and a rough mirror bends the wavefront in ways it only samples."""
+modes or tiles itself, and a rough mirror bends the wavefront in ways it only samples. [-]"""
 CURVATURE_SLACK = 0.1
 """Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]."""
 FARTHEST = 1000.0

@@ -28,7 +28,11 @@ WIDEST = 0.95
 """Largest sum of squared cosines of a grating lobe that is tried: 13° from the array's plane.
 [-]"""
 ORDERS = (-1, 0, 1)
-"""Grating lobes, along each axis, at which a wave may really have arrived."""
+"""Grating lobes, along each axis, at which a wave may really have arrived: at up to λ
+apart no other lies in front of the array. [-]"""
+GATE_CELLS = 4.0
+"""Range beyond the array's extent that is kept for the fit of a wave: its main lobe, and what the
+map's peak is off. As for walls (:mod:`estimator.walls.wall_detection_3d`). [cells c/B]"""
 
 
 def find_space_paths(
@@ -66,7 +70,7 @@ def find_space_paths(
         if power[i, j, k] * residual.samples.size < least:
             break
         length = float(this_map.path_length[k])
-        near = gated(residual, length, reach=2 * array.half + 4 * cell)
+        near = gated(residual, length, reach=2 * array.half + GATE_CELLS * cell)
         start = _best_lobe(near, array, (float(this_map.along[i]), float(this_map.up[j])), length)
         try:
             free = fit_wavefront(

@@ -18,7 +18,11 @@ from estimator.array.resolution_cell import Resolution
 from estimator.walls.fitted_line import FittedLine
 
 FACETS = 48
-"""Places along a wall, the straight way included."""
+"""Places along a wall over which a cloud's ways are tried, the straight way included: their
+pairs fill the cloud. Chosen, not measured. [-]"""
+MARGIN = 2.0
+"""Range before and behind a cloud, and distance from a mixed echo in range and sine, within which a
+point counts to it: the survey's main lobe ends at 1.4, and both are off by half a cell. [cells]"""
 
 
 def in_cloud(
@@ -54,7 +58,7 @@ def in_cloud(
         sines = 0.5 * (facet_sine[out] + facet_sine[back])
         ranges = 0.5 * (length[out] + length[back])
         beside = np.abs(sine[:, None] - sines) < resolution.across_ray
-        margin = 2 * resolution.along_ray
+        margin = MARGIN * resolution.along_ray
         nearest = np.where(beside, ranges, np.inf).min(axis=1) - margin
         farthest = np.where(beside, ranges, -np.inf).max(axis=1) + margin
         inside |= (reach > nearest) & (reach < farthest)
@@ -73,8 +77,8 @@ def between(
     """
     sine, reach = _polar(points)
     sines, ranges = _polar(np.stack([first, second]))
-    near: np.ndarray = (np.abs(sine - sines.mean()) < 2 * resolution.across_ray) & (
-        np.abs(reach - ranges.mean()) < 2 * resolution.along_ray
+    near: np.ndarray = (np.abs(sine - sines.mean()) < MARGIN * resolution.across_ray) & (
+        np.abs(reach - ranges.mean()) < MARGIN * resolution.along_ray
     )
     return near
 

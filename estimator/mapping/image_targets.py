@@ -36,6 +36,8 @@ SHADOW_CELLS = 2.0
 REPEATED_WITHIN = 2.0
 """Distance from where a repetition would come from in which its origin is looked for. [cells]"""
 MOST_TARGETS = 24
+"""Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
+"""
 ZOOM = 7
 """Points along each axis on which a maximum is focused anew, within a pixel of it. [-]"""
 ZOOMS = 4
@@ -43,8 +45,12 @@ ZOOMS = 4
 RANDOM = 20.0
 """Coherence factor times positions of what is one wave: of random phases it is exponential with
 mean one, and passes 20 at one of 5e8 places. [-]"""
+LEAST_COHERENCE = 0.5
+"""Coherence factor from which something is one wave however few positions there are (fewer than
+twice :data:`RANDOM`): more than half of the energy in phase. [-]"""
 MOST_CHANNELS = 5000
-"""Positions that are asked for it: an extended target has the coherence of a part of itself. [-]"""
+"""Positions that are asked for :data:`RANDOM`: an extended target has the coherence of a part of
+itself. [-]"""
 
 
 def image_targets(
@@ -183,7 +189,7 @@ def _one_wave(echo: Echo, place: Float[np.ndarray, " 3"]) -> bool:
         np.exp(2j * np.pi / speed_of_light * np.outer(length, echo.frequencies)),
     )
     energy = float(np.vdot(turned, turned).real)
-    return abs(complex(turned.sum())) ** 2 > min(RANDOM, 0.5 * chosen.size) * energy
+    return abs(complex(turned.sum())) ** 2 > min(RANDOM, LEAST_COHERENCE * chosen.size) * energy
 
 
 def _repeats(

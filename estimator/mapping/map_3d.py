@@ -25,6 +25,8 @@ from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall, una
 TARGET_LEVEL = 1e-3
 """Intensity, over that of the brightest target, of what still is one. [-]"""
 MOST_TARGETS = 24
+"""Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
+"""
 STANDS_OUT = 25.0
 """Intensity over the background's that a target must reach: of pure background one voxel in 1e10
 does. [-]"""
@@ -39,7 +41,19 @@ SKIRT = 0.03
 """Intensity over the brightest voxel's in that neighbourhood (−15 dB), below which a voxel belongs
 to that one's main lobe: the lobe falls so far 0.93 cells from its peak. [-]"""
 FEWEST_VOXELS = 3
-"""Pixels of the survey, 0.49 cells apart, that a target must fill: fewer are one speckle's tip."""
+"""Pixels of the survey, 0.49 cells apart, that a target must fill: fewer are one speckle's tip.
+[pixels]"""
+ON_LOBE = 1e-9
+"""Distance from a known grating lobe within which a voxel is that lobe: lobes stand at voxels'
+places, so that only rounding parts them. [m]"""
+LOBE_PIXELS = 2
+"""Pixels on either side of a grating lobe's peak that go with it: 0.98 cells, within which its main
+lobe falls by :data:`SKIRT`. [pixels]"""
+SAME_TARGET = 3.0
+"""Distance across the ray within which two targets are one, seen two ways: as for walls
+(:data:`ON_PLANE`). [cells]"""
+LEAST_BACKGROUND = 1e-300
+"""Least background that a level is divided by: above 0 in float64. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,8 +244,8 @@ def _targets(
         lobes = cKDTree(looked.lobes)
         tops = np.argwhere(bright & (intensity == scipy.ndimage.maximum_filter(intensity, size=3)))
         top_points = points[tuple(tops.T)]
-        for place in tops[lobes.query(top_points)[0] < 1e-9]:
-            around_lobe = tuple(slice(max(i - 2, 0), i + 3) for i in place)
+        for place in tops[lobes.query(top_points)[0] < ON_LOBE]:
+            around_lobe = tuple(slice(max(i - LOBE_PIXELS, 0), i + LOBE_PIXELS + 1) for i in place)
             bright[around_lobe] = False
     patches, count = scipy.ndimage.label(bright, structure=np.ones((3, 3, 3)))
     found: list[SpaceTarget] = []
@@ -246,7 +260,7 @@ def _targets(
         if lobe_of_a_wall(echo, array, points[members], intensity[members], planes):
             continue
         target = _target(points[members], intensity[members], walls)
-        near = 3 * resolution.across_ray * float(np.linalg.norm(target.position))
+        near = SAME_TARGET * resolution.across_ray * float(np.linalg.norm(target.position))
         if any(np.linalg.norm(target.position - other.position) < near for other in found):
             continue  # the same once more, seen another way
         found.append(target)
@@ -289,7 +303,9 @@ def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
                 normal=frame.turned_to_world(wall.normal),
                 covariance=wall.covariance,
                 confidence=plane.confidence,
-                level_db=float(10 * np.log10(plane.level / max(plane.background, 1e-300))),
+                level_db=float(
+                    10 * np.log10(plane.level / max(plane.background, LEAST_BACKGROUND))
+                ),
                 seen_through=through,
                 corners=frame.to_world(wall.corners),
             )

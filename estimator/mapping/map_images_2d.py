@@ -17,9 +17,13 @@ from estimator.results.estimate import Images
 from estimator.results.pixel_grid import PixelGrid
 
 PIXELS = 2_000_000
-"""Most pixels of an image that is shown; its spacing grows beyond."""
+"""Most pixels of an image that is shown, 32 MB of complex values; its spacing grows beyond.
+[pixels]"""
 MARGIN = 0.05
-"""What an image shows around the outermost things in it. [m]."""
+"""What an image shows around the outermost things in it, so that none lies on its
+rim. [m]"""
+SPACING = 0.5
+"""Distance of pixels: two a cell sample the intensity as the sampling theorem asks. [cells]"""
 
 
 def room_images(
@@ -53,7 +57,7 @@ def room_images(
 def _grid(shown: Float[np.ndarray, "points 3"], cell: float) -> PixelGrid:
     """Cover all points that are to be seen, with two pixels a range cell if affordable."""
     low, high = shown.min(axis=0) - MARGIN, shown.max(axis=0) + MARGIN
-    spacing = max(0.5 * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
+    spacing = max(SPACING * cell, float(np.sqrt(np.prod((high - low)[:2]) / PIXELS)))
     return PixelGrid.spanning(
         x=(float(low[0]), float(high[0])),
         y=(float(low[1]), float(high[1])),

@@ -14,11 +14,17 @@ from estimator.results.estimate import Images
 from estimator.results.pixel_grid import PixelGrid
 
 VOXELS = 1_500_000
-"""Most voxels of an image; its spacing grows beyond."""
+"""Most voxels of an image, 24 MB of complex values; its spacing grows beyond. [voxels]"""
 MARGIN = 0.05
 """What an image shows around the outermost things in it, over their extent. [-]"""
 SKIN = 2.0
-"""Range cells behind a wall that are still its own image: the taper's main lobe reaches 1.7."""
+"""Range behind a wall that is still its own image, and further margin of the image across the
+ray: the taper's main lobe reaches 1.7. [cells]"""
+SPACING = 0.5
+"""Distance of voxels: two a cell sample the intensity as the sampling theorem asks. [cells]"""
+ALONG_BORESIGHT = 0.5
+"""Cosine between an axis of the world and the boresight above which it is sampled as the range is:
+60°, within which one axis lies whatever the boresight (at 55° at most from the nearest). [-]"""
 
 
 def space_images(
@@ -54,11 +60,11 @@ def _grid(
     low, high = places.min(axis=0), places.max(axis=0)
     middle = float(np.median(np.linalg.norm(shown, axis=1)))
     # The tapered main lobe reaches 1.7 cells beyond what it shows.
-    margin = MARGIN * float((high - low).max()) + 2 * resolution.across_ray * middle
+    margin = MARGIN * float((high - low).max()) + SKIN * resolution.across_ray * middle
     low, high = low - margin, high + margin
-    fine, coarse = 0.5 * resolution.along_ray, 0.5 * resolution.across_ray * middle
+    fine, coarse = SPACING * resolution.along_ray, SPACING * resolution.across_ray * middle
     # The world's axis nearest to the boresight is sampled as the range is.
-    spacing = np.where(np.abs(frame.axes[1]) > 0.5, fine, max(fine, coarse))
+    spacing = np.where(np.abs(frame.axes[1]) > ALONG_BORESIGHT, fine, max(fine, coarse))
     spacing = spacing * max(1.0, (float(np.prod((high - low) / spacing)) / VOXELS) ** (1 / 3))
     return PixelGrid.spanning(
         x=(float(low[0]), float(high[0])),

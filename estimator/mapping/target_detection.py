@@ -44,6 +44,9 @@ than once reaches -26 dB. [-]"""
 TOLD = 3.0
 """Bend of a cloud's wavefront from which on its speckle is told from a ghost: the intensity
 of a focus without it falls by half at 2.7 rad. [rad]"""
+ONE_PLACE = 2.0
+"""Distance within which peaks are one or on one ray's or arc's sidelobes, and targets are one or on
+a wall: the survey's main lobe ends at 1.4, and a place is off by half a cell. [cells]"""
 WINDOW = 40
 """Half the side of the neighbourhood of a peak. [pixels]"""
 WIDE = 2.0
@@ -203,9 +206,9 @@ def _belongs_to_another(spot: Spot, kept: Sequence[Spot], coarse: Resolution) ->
             abs(reach - far) / coarse.along_ray,
             abs(sine - other.place[0] / far) / (coarse.across_ray),
         )
-        if max(apart) < 2:
+        if max(apart) < ONE_PLACE:
             return True
-        if min(apart) < 2 and spot.intensity < SIDELOBE * other.intensity:
+        if min(apart) < ONE_PLACE and spot.intensity < SIDELOBE * other.intensity:
             return True
         if other.ends is not None and _in_region(spot, other):
             return True
@@ -355,14 +358,15 @@ def _is_known(
     """Tell whether a target is another view of one that is known, or of a wall."""
     reach = float(np.linalg.norm(target.ghost))
     cell = max(coarse.along_ray, coarse.across_ray * reach)
-    if any(np.linalg.norm(target.position - other.position) < 2 * cell for other in others):
+    if any(np.linalg.norm(target.position - other.position) < ONE_PLACE * cell for other in others):
         return True
     for wall in walls:
         along = wall.end - wall.start
         length = float(np.linalg.norm(along))
         place = float((target.position - wall.start) @ along) / length
         beside = np.linalg.norm(target.position - wall.start - place * along / length)
-        if beside < 2 * cell and -2 * cell < place < length + 2 * cell:
+        near = ONE_PLACE * cell
+        if beside < near and -near < place < length + near:
             return True
     return False
 

@@ -31,6 +31,11 @@ the 90 answers found in 288 random rooms were such ones and wrong. [-]"""
 TOGETHER = 0.9995
 """Probability of a place that scattering off two walls, or scattering and a path, tell. [-]"""
 
+UNSTATED = 0.5
+"""Probability of an answer that states none: nothing is known for or against it. [-]"""
+LEAST_DOUBT = 1e-9
+"""Least probability of the contrary that odds are divided by: they stay finite. [-]"""
+
 SAME = float(chi2.ppf(1 - false_alarm.DISAGREEMENT, df=2))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
 
@@ -77,8 +82,8 @@ def with_diffuse_search(
         if not _far_apart(answer, diffuse, uplink):
             return answer
         # One wall's scattering is right in ALONE of all cases: so much it weighs against the path.
-        believed = answer.probability if answer.probability is not None else 0.5
-        odds = believed / max(1 - believed, 1e-9) * (1 - ALONE) / ALONE
+        believed = answer.probability if answer.probability is not None else UNSTATED
+        odds = believed / max(1 - believed, LEAST_DOUBT) * (1 - ALONE) / ALONE
         believed = odds / (1 + odds)
         if believed >= CERTAIN:
             return replace(answer, probability=believed)

@@ -47,11 +47,14 @@ COARSEST = 0.064
 """Width of the first cells of the search. [m]"""
 
 MOST_CELLS = 60_000
-"""Most cells of one level; the best ones are kept."""
+"""Most cells of one level, for memory; the best ones are kept. [-]"""
+
+AT_ONCE = 4096
+"""Cells whose distances from all wall points are held at once: 3 MB for a hundred points. [-]"""
 
 LIT = 6.0
 """Intensity over the background from which a wall point counts as lit: speckle and noise pass
-it in 1 of 60 points (ln 2 · 6 = 4.2 times their mean)."""
+it in 1 of 60 points (ln 2 · 6 = 4.2 times their mean). [-]"""
 
 FEWEST_LIT = 0.5
 """Share of some wall's points that must be lit: a mirror-like path lights a few only. [-]"""
@@ -60,13 +63,24 @@ PARALLEL = float(np.cos(np.radians(10.0)))
 """Cosine between the normals of walls that count as parallel. [-]"""
 
 STRETCHES = 12
-"""Stretches of a wall whose distances are told apart."""
+"""Stretches of a wall whose distances are told apart. [-]"""
+
+FEWEST_STRETCHES = 5
+"""Stretches that must show a maximum: three more than the place's coordinates, for a covariance.
+[-]"""
+
+WIDEST, SHIFTS = 1.5, 49
+"""Distances that are tried about a place's own: to half a cell beyond the parabola's own width
+[cells c/B], and how many: sixteen a cell. [-]"""
+
+ROUNDS = 4
+"""Trilaterations, each from the place of the last: Gauss-Newton steps; chosen, not measured. [-]"""
 
 RIVAL = 0.9
 """Score, over the best one (both less the mean score), that makes a place a rival. [-]"""
 
 RIVAL_APART = 6.0
-"""Distance from the best place, in its deviations, beyond which a place is another one."""
+"""Distance from the best place, in its deviations, beyond which a place is another one. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -300,8 +314,8 @@ def _promising(
     reach = int(np.ceil(radius / anchors.step))
     widened = maximum_filter1d(anchors.scores, 2 * reach + 1, axis=1, mode="nearest")
     bounds, values = np.empty(len(cells)), np.empty(len(cells))
-    for first in range(0, len(cells), 4096):
-        some = slice(first, first + 4096)
+    for first in range(0, len(cells), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
         bounds[some], values[some] = (
             _score(anchors, cells[some], table)[0] for table in (widened, anchors.scores)
         )
@@ -319,9 +333,9 @@ def _refined(
     """Trilaterate from stretches of the walls, beginning at a place."""
     place = start
     cell = SAMPLES_PER_CELL * anchors.step
-    shifts = np.linspace(-1.5, 1.5, 49) * cell
+    shifts = np.linspace(-WIDEST, WIDEST, SHIFTS) * cell
     fit = np.abs(shifts) <= cell
-    for _ in range(4):
+    for _ in range(ROUNDS):
         distance, possible = _distances(anchors, place[None])
         usable = np.flatnonzero(possible[:, 0] & _lit(anchors, place))
         if len(usable) < STRETCHES:
@@ -343,7 +357,7 @@ def _refined(
             offsets.append(float(np.clip(-curve[1] / (2 * curve[2]), -1.0, 1.0)) * cell)
             weights.append(-float(curve[2]))
             rows_.append(directions[stretch].mean(axis=0))
-        if len(rows_) < 5:
+        if len(rows_) < FEWEST_STRETCHES:
             return None
         jacobian, residual, weight = np.array(rows_), np.array(offsets), np.sqrt(np.array(weights))
         normal = np.linalg.inv((jacobian * weight[:, None] ** 2).T @ jacobian)

@@ -88,7 +88,11 @@ PART = 0.1
 """Share of energy, over a path's, from which another beside it is a part of the same wave. [-]"""
 
 RINGS = (0.25, 0.5, 0.75, 1.0)
-"""Angles beside a path's own, over its reach of two deviations, at which its ray is tried."""
+"""Angles beside a path's own, over its reach of two deviations, at which its ray is tried: half a
+deviation apart. [-]"""
+
+LEAST_CHAIN = 1e-12
+"""Least probability of a chain that no ray about a path meets: its logarithm stays finite. [-]"""
 
 
 def chain_probabilities(
@@ -135,7 +139,7 @@ def log_weight(
     early = EARLIER_CELLS * room.resolution.along_ray
     for index, chain in used.items():
         path = found.paths[index]
-        total += np.log(max(chains[index].get(chain, 0.0), 1e-12))
+        total += np.log(max(chains[index].get(chain, 0.0), LEAST_CHAIN))
         excess = level_of(path, found, room)
         if excess is not None:
             first = arrives_first(path, found, room)

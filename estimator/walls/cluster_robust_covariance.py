@@ -19,7 +19,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 FEWEST_PARTS = 4
-"""Parts that a line is cut into, however short it is: two of them fit any tilt and offset."""
+"""Parts that a line is cut into, however short it is: two of them fit any tilt and offset.
+[-]"""
 LEAST_LEFT = 1e-3
 """Least share of the normal matrix that is taken to lie outside a part: where one glint holds all
 of it, the covariance is large (a thousand times the sandwich's), not infinite. [-]"""

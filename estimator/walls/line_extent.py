@@ -19,17 +19,21 @@ from estimator.walls.line_detection import GAP
 from estimator.walls.line_sampling import SAMPLES_PER_CELL, cell_along, levels
 
 CELLS_AT_END = 12.0
-"""Cells either side of a wall's rough end that are searched for it."""
+"""Distance to either side of a wall's rough end that is searched for it: a dim shoulder
+(:func:`end_of`) may pass for wall so far before it. Chosen, not measured. [cells]"""
 CELLS_OF_STEP = 3.0
-"""Cells either side of an end whose mean levels differ most: speckle in so many leaves their mean
-a deviation of 3 dB, and walls end by tens of decibels."""
+"""Distance to either side of an end over which mean levels differ most: speckle in so many leaves
+their mean a deviation of 3 dB, and walls end by tens of decibels. [cells]"""
 LEAST_LIT = 0.3
 """Share of the places between a wall's first and last bright ones that are bright. Of the speckle
 of a wall C times as bright as its background, exp(−1/√C) is above the halfway level: 0.73 at
 C = 10; of a few unconnected glints little is. [-]"""
 END_LEVEL = 0.1
 """Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
-of ten, and the tapered main lobe reaches it 0.8 cells beyond an end."""
+of ten, and the tapered main lobe reaches it 0.8 cells beyond an end. [-]"""
+STEPS_OUT = 2
+"""Lengths :data:`CELLS_OF_STEP` before the highest step in which the wall may already begin: a
+minimum of the speckle may be a higher step. [-]"""
 
 
 def lit_extent(
@@ -96,7 +100,7 @@ def end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:
     step = start + int(np.argmax(steps[start : rough + near]))
     # A minimum of the speckle may be a higher step than the wall's end, a few cells further out.
     enough = np.median(level_db[step : step + near]) + 10 * np.log10(END_LEVEL / np.log(2))
-    outer = max(0, step - 2 * wide)
+    outer = max(0, step - STEPS_OUT * wide)
     return outer + int(np.argmax(np.append(level_db[outer:step] > enough, True)))
 
 

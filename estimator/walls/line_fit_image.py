@@ -45,7 +45,7 @@ TILT_RANGE = 2.0
 """Largest displacement of an end by a trial tilt, over that by a trial offset: the tilt of a line
 between ends that are known to a cell each is so uncertain. [-]"""
 TRIALS = 9
-"""Trial angles and trial offsets of each round."""
+"""Trial angles and trial offsets of each round: a quarter of the half width apart. [-]"""
 ROUNDS = 4
 """Grids of trials, each finer than the one before: to 1/27 of the first one's width. [-]"""
 NARROWER = 3
@@ -70,7 +70,7 @@ and 0.5 to 1.3. ``python -m validation.experiments.thresholds walls``, with half
 to 1.7 and 0.2 to 2.7, but 8 for the tilt of a wall of 40 cm at 0.4 m: lines that the echo does not
 place (:mod:`estimator.walls.line_refinement`) may state too small a variance there. [-]"""
 SUMMIT_SAMPLES_PER_CELL = 4
-"""Along the wall; the intensity has twice the image's bandwidth."""
+"""Along the wall; the intensity has twice the image's bandwidth. [-]"""
 BRIGHTNESS = (1.5, 1.0, 0.5)
 """Powers of the magnitude that K sums, tried in turn until K has a maximum near the line. On a
 rough wall whose level falls by tens of decibels, a few glints dominate the first power: it once
@@ -79,9 +79,12 @@ LEAST_RISE = 0.98
 """Least K at the fitted maximum, over K at the start: a maximum cannot be lower, but the paraboloid
 is fitted to within a per cent or two. [-]"""
 PASSES = 3
-"""Times that the paraboloid is fitted about its own summit."""
+"""Times that the paraboloid is fitted about its own summit. [-]"""
 FEWEST_PLACES = 4
-"""Places along a line that still have modes of a higher order than its tilt."""
+"""Places along a line that still have modes of a higher order than its tilt. [-]"""
+FEWEST_MODES = 4
+"""Modes that are used, however short the line is: two beyond the tilt's, to extrapolate from.
+[-]"""
 SUMMIT = 0.6
 """Half the width of the neighbourhood that the paraboloid is fitted to: there the main lobe departs
 from it by 1 %. [cells]"""
@@ -275,7 +278,7 @@ def _slow_power(
     weights
         Of the places in the fit.
     """
-    count = min(MODES, max(4, len(scores) // (2 * SUMMIT_SAMPLES_PER_CELL)))
+    count = min(MODES, max(FEWEST_MODES, len(scores) // (2 * SUMMIT_SAMPLES_PER_CELL)))
     polynomials = np.polynomial.legendre.legvander(across, count - 1)
     modes = np.linalg.qr(polynomials * weights[:, None])[0]
     powers = (modes.T @ scores) ** 2

@@ -17,7 +17,7 @@ from estimator import false_alarm
 from estimator.array.resolution_cell import Resolution
 
 DRAWS = 6000
-"""Planes drawn in each round: one that a tenth of the peaks lie on is drawn six times."""
+"""Planes drawn in each round: one that a tenth of the peaks lie on is drawn six times. [-]"""
 
 FEWEST_INLIERS = 12
 """Peaks that make a plane, besides what chance demands. [-]"""

@@ -41,7 +41,15 @@ MOST_CUT = 0.2
 FEWEST_POINTS = 9
 """Points on a plane that three unknowns are fitted to: each counts three times. [-]"""
 MOST_POINTS = 3000
-"""Points on the plane that are focused: more add time, but no cells."""
+"""Points on the plane that are focused: more add time, but no cells. [-]"""
+UPRIGHT = 1e-6
+"""Sine of a normal's angle from the vertical below which no horizontal axis is told: rounding.
+[-]"""
+SPACING = 0.5
+"""Distance of places on a plane: two a cell sample the intensity as the sampling theorem asks.
+[cells]"""
+LEAST_EXTENT = 1e-6
+"""Least extent of the places on a plane that is divided by: a single row has none. [m]"""
 ROUNDS = 3
 """Paraboloids fitted one after the other, each about the summit of the one before. [-]"""
 LEAN = np.array([0.01, 0.01, 0.005])
@@ -90,7 +98,7 @@ class FittedPlane:
 def plane_axes(normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "2 3"]:
     """Return a horizontal axis in a plane and the one across it; their product is the normal."""
     first = np.cross([0.0, 0.0, 1.0], normal)
-    if np.linalg.norm(first) < 1e-6:
+    if np.linalg.norm(first) < UPRIGHT:
         first = np.array([1.0, 0.0, 0.0])
     first = first - (first @ normal) * normal
     first = first / np.linalg.norm(first)
@@ -125,7 +133,7 @@ def refine_plane(focus: Focus, wall: PlaneWall, resolution: Resolution) -> Plane
         places, points = points_on(wall, resolution)
         if len(points) < FEWEST_POINTS:
             return None
-        scale = np.array([*(1 / np.maximum(np.abs(places).max(axis=0), 1e-6)), 1.0]) * cell
+        scale = np.array([*(1 / np.maximum(np.abs(places).max(axis=0), LEAST_EXTENT)), 1.0]) * cell
         depths = width * cell * np.linspace(-1, 1, DEPTHS if width <= SUMMIT else 3 * DEPTHS)
         off = _conjugate(points, wall.normal, resolution)
         magnitude = np.abs(focus(points[:, None] + depths[:, None] * off[:, None]))
@@ -171,7 +179,7 @@ def points_on(
     """Sample a wall's polygon at half a cell, counted from its centre. [m]."""
     corners = (wall.corners - wall.centre) @ wall.axes.T
     low, high = corners.min(axis=0), corners.max(axis=0)
-    step = 0.5 * np.array([float(resolution.cell(wall.centre, axis)) for axis in wall.axes])
+    step = SPACING * np.array([float(resolution.cell(wall.centre, axis)) for axis in wall.axes])
     step *= max(1.0, np.sqrt(np.prod((high - low) / step) / MOST_POINTS))
     lines = [np.arange(a + s / 2, b, s) for a, b, s in zip(low, high, step, strict=True)]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -252,7 +260,7 @@ def extent_of_plane(
     cells = np.array([float(resolution.cell(wall.centre, axis)) for axis in wall.axes])
     across = float(resolution.cell(wall.centre, wall.normal))
     farthest = min(reach[1], FARTHEST * float(np.linalg.norm(wall.corners, axis=1).max()))
-    step = np.maximum(0.5 * cells, farthest / MOST_STEPS)
+    step = np.maximum(SPACING * cells, farthest / MOST_STEPS)
     lines = [np.arange(-int(farthest / s), int(farthest / s) + 1) * s for s in step]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
     points = wall.centre + places @ wall.axes

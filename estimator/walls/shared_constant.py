@@ -30,6 +30,11 @@ CONFIDENCE = 0.9
 """Confidence of a mirror of which only this is known: below what is reported as certain. [-]"""
 OVERSAMPLED = 8
 """Delays tried for each range cell. [-]"""
+MULTIPLE_LEVEL = 3.0
+"""Magnitude over the profile's median from which a multiple is counted: of Rayleigh noise one delay
+in 500 has it. It is only told, and decides nothing. [-]"""
+LEAST_VARYING = 1e-30
+"""Least energy that the positions do not share, over what they do, that is divided by. [-]"""
 MULTIPLE = 1.5
 """Distance from a multiple of the plate's within which a delay is one. [cells c/2B]"""
 
@@ -57,7 +62,7 @@ def without_constant(echo: Echo) -> SharedConstant:
     constant = echo.samples.mean(axis=0)
     rest = echo.samples - constant
     shared = float(np.vdot(constant, constant).real) * len(rest)
-    varying = max(float(np.vdot(rest, rest).real), 1e-30 * shared)
+    varying = max(float(np.vdot(rest, rest).real), LEAST_VARYING * shared)
     if len(rest) < FEWEST or shared < 10 ** (PROPOSED_DB / 10) * varying:
         return SharedConstant(echo=echo)
     distance, explained, deviation = _one_delay(constant, echo.frequencies)
@@ -147,7 +152,7 @@ def _multiples(
     magnitude = np.abs(_profile(constant * window, frequencies))
     period = unambiguous_path(frequencies) / 2
     step = period / magnitude.size
-    floor = 3 * float(np.median(magnitude))
+    floor = MULTIPLE_LEVEL * float(np.median(magnitude))
     reach = max(1, int(MULTIPLE * cell / step))
     count = 0
     for order in range(2, int(period / distance)):

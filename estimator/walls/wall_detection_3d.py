@@ -39,12 +39,14 @@ from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
 LEAST_CONFIDENCE = 1 - false_alarm.WALL
 """Confidence of a wall that is reported. [-]"""
 FLASHES = 6
-"""Brightest peaks, beams apart, that are looked at for a flat wave."""
+"""Brightest peaks, beams apart, that are looked at for a flat wave: as many as a box has
+walls; chosen, not measured. [-]"""
 FLAT = 0.25
 """Curvature, over that of a point at the distance, up to which a wave counts as flat. A disc of
 one Fresnel zone, √(λR/2) in radius, has half of it; a wall that is larger has none. [-]"""
 MOST_VOXELS = 200
-"""Brightest voxels of a cluster that are traced to where they may be the grating lobe of."""
+"""Brightest voxels of a cluster that are traced to where they may be the grating lobe of: for
+time; chosen, not measured. [-]"""
 STANDS_OUT = 0.25
 """Share of the energy that arrives around its distance that a flat wave must explain: chance
 makes flat waves of the speckle of a rough wall, but faint ones. [-]"""

@@ -13,14 +13,19 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from validation.baselines.arrivals import plane_wave_angle
-from validation.baselines.multilateration import REACH, STARTS
+from validation.baselines.multilateration import CONVERGED, REACH, STARTS
 from validation.baselines.room import ANCHORS, Fix, Room
 
 ELEMENTS = 64
+"""Antennas of the user's array: a beam of 1.6°, half a wavelength apart. Chosen, as the method
+names none for our band. [-]"""
 POINTS = 51
 """Frequencies that the angles are averaged over: of our band. [-]"""
 TURN = np.radians(7.0)
 """By which the user's array is turned, unknown to the method. [rad]"""
+ASIDE = 1e-3
+"""By which starts stand aside of the grid: no descent begins on an anchor, where angles jump.
+[m]"""
 
 
 def angle_difference(room: Room) -> Fix:
@@ -56,8 +61,8 @@ def from_differences(
 
     side = np.linspace(-REACH, REACH, STARTS)
     fits = [
-        least_squares(residuals, centre + np.array([x, y]), xtol=1e-12, ftol=1e-12)
-        for x in side + 1e-3
-        for y in side + 1e-3
+        least_squares(residuals, centre + np.array([x, y]), xtol=CONVERGED, ftol=CONVERGED)
+        for x in side + ASIDE
+        for y in side + ASIDE
     ]
     return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)

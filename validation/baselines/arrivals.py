@@ -14,6 +14,19 @@ DETECTION_DB = 13.0
 """Peak over the median of the profile from which a path counts as heard: noise alone reaches
 that in one of some thousand cells. [dB]"""
 OVERSAMPLING = 8
+"""Lengths tried for each cell c/B: a search begins within a sixteenth of a cell of a peak. [-]"""
+MOST_PATHS = 6
+"""Paths at which the search over a band with gaps ends; chosen, not measured. [-]"""
+LENGTH_TOLERANCE = 1e-7
+"""To which a path's length is searched: far below a wavelength of 1 mm. [m]"""
+ANGLE_OVERSAMPLING = 8
+"""Cosines tried for each antenna: at half a wavelength seven for each −3 dB beam, so that a search
+begins on the main lobe. [-]"""
+FEWEST_COSINES = 64
+"""Cosines that are tried of a small array, at least; chosen, not measured. [-]"""
+COSINE_TOLERANCE = 1e-8
+"""To which a cosine is searched: the square root of float64's rounding, below which a maximum is
+flat. [-]"""
 
 
 def strength_db(pilot: Uplink) -> float:
@@ -64,7 +77,7 @@ def first_arrival(
         lambda length: -float(level(np.array([length]))[0]),
         bounds=(coarse - cell / OVERSAMPLING, coarse + cell / OVERSAMPLING),
         method="bounded",
-        options={"xatol": 1e-7},
+        options={"xatol": LENGTH_TOLERANCE},
     )
     return float(best.x)
 
@@ -73,7 +86,7 @@ def first_sparse_arrival(
     samples: Complex[np.ndarray, " freqs"],
     frequencies: Float[np.ndarray, " freqs"],
     *,
-    most: int = 6,
+    most: int = MOST_PATHS,
 ) -> float | None:
     """Return the same for a band with gaps: the profile is a sum of a few paths [m].
 
@@ -104,7 +117,7 @@ def first_sparse_arrival(
             lambda length, rest=rest: -float(np.abs(np.exp(turns * length) @ rest)),
             bounds=(start - cell / OVERSAMPLING, start + cell / OVERSAMPLING),
             method="bounded",
-            options={"xatol": 1e-7},
+            options={"xatol": LENGTH_TOLERANCE},
         )
         found.append(float(best.x))
         waves = np.exp(-np.outer(turns, found))
@@ -131,7 +144,7 @@ def plane_wave_angle(pilot: Uplink) -> float:
         steering = np.exp(-1j * cosine * np.outer(places, wavenumbers))
         return float((np.abs((steering * pilot.samples).sum(axis=0)) ** 2).sum())
 
-    count = max(8 * len(places), 64)
+    count = max(ANGLE_OVERSAMPLING * len(places), FEWEST_COSINES)
     cosines = np.linspace(-1.0, 1.0, count + 1)
     best = float(cosines[int(np.argmax([power(float(cosine)) for cosine in cosines]))])
     step = 2.0 / count
@@ -139,6 +152,6 @@ def plane_wave_angle(pilot: Uplink) -> float:
         lambda cosine: -power(float(cosine)),
         bounds=(max(best - step, -1.0), min(best + step, 1.0)),
         method="bounded",
-        options={"xatol": 1e-8},
+        options={"xatol": COSINE_TOLERANCE},
     )
     return float(np.arccos(found.x))

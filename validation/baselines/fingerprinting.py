@@ -17,17 +17,27 @@ from validation.baselines.arrivals import plane_wave_angle, strength_db
 from validation.baselines.room import ANCHORS, Fix, Room
 
 ELEMENTS = 16
+"""Antennas of each anchor, by which it tells an angle; chosen, not measured. [-]"""
 POINTS = 16
 """Frequencies of the fingerprint, over our band. [-]"""
 PITCH = 0.15
 """Distance of surveyed places. [m]"""
 EAST = (0.1, 1.2)
+"""The part of the room that is surveyed, from west to east. [m]"""
 NORTH = (0.25, 0.95)
-"""The part of the room that is surveyed. [m]"""
+"""The same from south to north. [m]"""
+OFF_ROUND = (0.03, 0.02)
+"""By which the survey begins east and north of that: users stand at round numbers, and a place that
+was surveyed itself would flatter the method. [m]"""
 NEIGHBOURS = 4
+"""Places that are averaged: those around a place on a grid. [-]"""
 ANGLE_SCALE = np.radians(2.0)
+"""Difference of angles that counts as much as one of :data:`LEVEL_SCALE_DB`: what fading moves it
+by from place to place. Chosen, not measured. [rad]"""
 LEVEL_SCALE_DB = 2.0
-"""Differences that count alike: what fading moves them by from place to place."""
+"""Difference of levels, as above. Chosen, not measured. [dB]"""
+LEAST_APART = 1e-9
+"""Added to a distance of fingerprints that is divided by: one may be met exactly. [-]"""
 
 
 def fingerprinting(room: Room) -> Fix:
@@ -39,8 +49,8 @@ def fingerprinting(room: Room) -> Fix:
 
 def survey_grid() -> Float[np.ndarray, "places 2"]:
     """Return the surveyed places, off the round numbers that users stand at [m]."""
-    x = np.arange(EAST[0] + 0.03, EAST[1], PITCH)
-    y = np.arange(NORTH[0] + 0.02, NORTH[1], PITCH)
+    x = np.arange(EAST[0] + OFF_ROUND[0], EAST[1], PITCH)
+    y = np.arange(NORTH[0] + OFF_ROUND[1], NORTH[1], PITCH)
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
@@ -62,5 +72,5 @@ def nearest(
     """Average the places of the nearest fingerprints, weighted by the inverse of their distance."""
     apart = np.linalg.norm(prints - heard, axis=-1)
     best = np.argsort(apart, kind="stable")[:NEIGHBOURS]
-    weights = 1 / (apart[best] + 1e-9)
+    weights = 1 / (apart[best] + LEAST_APART)
     return np.asarray((weights[:, None] * places[best]).sum(axis=0) / weights.sum())

@@ -17,10 +17,11 @@ from validation.baselines.multilateration import multilaterate
 from validation.baselines.room import Anchor, Fix, Room
 
 ANTENNAS = (Anchor(x=-0.05, y=0.0), Anchor(x=0.05, y=0.0), Anchor(x=0.0, y=-0.0866))
+"""An equilateral triangle of 0.10 m, about as large as our array is long. [m]"""
 CHANNELS = (0.0, 0.04, 0.13, 0.27, 0.42, 0.60, 0.83, 0.97)
-"""Where channels begin, over the band. [-]"""
+"""Where channels begin, over the band: unevenly, so that grating lobes do not agree. [-]"""
 WIDTH = 2e9
-"""Of a channel. [Hz]"""
+"""Of a channel: as wide as those of IEEE 802.11ad, 2.16 GHz, about. [Hz]"""
 
 
 def multiband_toa(room: Room) -> Fix:

@@ -8,6 +8,8 @@ REACH = 2.5
 """Half width of the square around the anchors in which positions are sought. [m]"""
 STARTS = 4
 """Places on each side of the square from which the search descends. [-]"""
+CONVERGED = 1e-12
+"""Relative change of place, or of cost, that ends a descent: far below any error. [-]"""
 
 
 def multilaterate(
@@ -41,7 +43,7 @@ def multilaterate(
 
     side = np.linspace(-REACH, REACH, STARTS)
     fits = [
-        least_squares(residuals, centre + np.array([x, y]), xtol=1e-12, ftol=1e-12)
+        least_squares(residuals, centre + np.array([x, y]), xtol=CONVERGED, ftol=CONVERGED)
         for x in side
         for y in side
     ]

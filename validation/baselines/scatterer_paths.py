@@ -22,8 +22,9 @@ from estimator.measurement.model import Uplink
 from validation.baselines.room import Fix, Room
 
 USER_ELEMENTS = 8
-"""Antennas in each of the user's two rows."""
+"""Antennas in each of the user's two rows. [-]"""
 USER_SPACING = 0.5e-3
+"""Their distance: half a wavelength at 300 GHz. [m]"""
 LISTENING = 16
 """Elements of our array that hear each of the user's antennas; all hear the first one. [-]"""
 POINTS = 501
@@ -31,12 +32,18 @@ POINTS = 501
 LISTENING_POINTS = 161
 """Frequencies at which they do: enough to tell paths apart that were found with all. [-]"""
 MOST_PATHS = 4
+"""Paths at which the search ends: as many as our own estimator takes. [-]"""
 WEAKEST_DB = -15.0
 """Level over the strongest path down to which paths are used: below, a rough wall's speckle is
 taken for paths. [dB]"""
 DIRECT = np.radians(3.0)
 """Angle within which departure and arrival face each other: a wavelength over one of the user's
 rows is 19°, and a strong path's direction is known to a part of that. [rad]"""
+DIRECTION_STEP_DEG = 0.05
+"""Distance of directions that are tried: far below a row's beam of 19°. [°]"""
+PARALLEL = 1e-4
+"""Least eigenvalue of the lines' normal matrix from which they intersect: of two lines it is the
+squared sine of half the angle between them, doubled, here 0.8°. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +113,7 @@ def departure(
     An antenna that stands nearer to the bounce is heard earlier: the phase rises with
     the offset along the direction. Compared with all directions, 0.05° apart.
     """
-    angles = np.radians(np.arange(0.0, 360.0, 0.05))
+    angles = np.radians(np.arange(0.0, 360.0, DIRECTION_STEP_DEG))
     towards = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     turns = np.einsum("ax,ox->ao", towards, offsets) * frequency / speed_of_light
     match = np.abs((np.exp(-2j * np.pi * turns) * gains).sum(axis=-1))
@@ -135,6 +142,6 @@ def intersect(station: Float[np.ndarray, " 2"], paths: list[BouncePath]) -> Fix:
         across = np.eye(2) - np.outer(along, along)
         normal += across
         right += across @ (station - path.length * path.leaves_to)
-    if np.linalg.eigvalsh(normal)[0] < 1e-4:
+    if np.linalg.eigvalsh(normal)[0] < PARALLEL:
         return Fix(position=None, reason="the lines of the bounced paths are parallel")
     return Fix(position=np.linalg.solve(normal, right))

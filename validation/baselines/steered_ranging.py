@@ -19,8 +19,14 @@ from validation.baselines.arrivals import first_arrival, plane_wave_angle
 from validation.baselines.room import Fix, Room
 
 LOW = Radio(start_ghz=27.5, stop_ghz=28.5, points=11)
+"""The low band: 1 GHz about 28 GHz, as 5G uses. [GHz]"""
 LOW_ELEMENTS = 8
+"""Antennas of the low band's array: 37 mm. [-]"""
 BEAM_ELEMENTS = 32
+"""Elements of ours that form a beam: beyond 0.44 m they are in the far field. [-]"""
+MOST_BEAMS = 64
+"""Beams on either side of the low band's direction that are listed: 0.034 in cosine apart, they
+reach over all directions, of which those in the low band's beam are tried. [-]"""
 
 
 def steered_ranging(room: Room) -> Fix:
@@ -32,7 +38,7 @@ def steered_ranging(room: Room) -> Fix:
     count = len(pilot.positions)
     width = speed_of_light / LOW.centre_frequency / (LOW_ELEMENTS * low.spacing)
     step = speed_of_light / float(pilot.frequencies.mean()) / (2 * count * own.spacing)
-    near = step * np.round(np.cos(coarse) / step + np.arange(-64, 65))
+    near = step * np.round(np.cos(coarse) / step + np.arange(-MOST_BEAMS, MOST_BEAMS + 1))
     beams = near[(np.abs(near - np.cos(coarse)) <= width / 2 + step) & (np.abs(near) < 1)]
     along = (np.arange(count) - (count - 1) / 2) * own.spacing
     wavenumbers = 2 * np.pi * pilot.frequencies / speed_of_light

@@ -11,6 +11,10 @@ from validation.baselines.arrivals import first_arrival
 from validation.baselines.multilateration import multilaterate
 from validation.baselines.room import ANCHORS, Fix, Room
 
+FEWEST = 3
+"""Anchors that must hear the user, and one more where its clock is unknown: two circles intersect
+at two places. [-]"""
+
 
 def toa_trilateration(room: Room, *, clock_known: bool = True) -> Fix:
     """Measure the first path's length at each anchor, and intersect."""
@@ -21,7 +25,7 @@ def toa_trilateration(room: Room, *, clock_known: bool = True) -> Fix:
         if length is not None:
             places.append(anchor.position)
             lengths.append(length)
-    least = 3 if clock_known else 4
+    least = FEWEST if clock_known else FEWEST + 1
     if len(places) < least:
         return Fix(position=None, reason=f"{len(places)} anchors hear the user; {least} are needed")
     found = multilaterate(np.stack(places), np.array(lengths), clock_known=clock_known)
