@@ -17,14 +17,16 @@ MOST_PATHS = 4
 """Waves that are taken out of one pilot: each choice of them and of the walls is a hypothesis.
 [-]"""
 LEAST_SHARE = 0.05
-"""Share of the pilot's energy (less the noise) below which a wave is not looked at. [-]"""
+"""Share of the pilot's energy (less the noise) below which a wave is not looked at: the speckle of
+a rough wall has less. Chosen, not measured. [-]"""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the covariance is an estimate from few
 modes or tiles itself, and a rough mirror bends the wavefront in ways it only samples. [-]"""
 CURVATURE_SLACK = 0.1
-"""Further disagreement allowed, over the curvature; a scatterer must differ by more. [-]."""
+"""Further disagreement allowed, over the curvature; a scatterer must differ by more. Chosen, not
+measured. [-]"""
 FARTHEST = 1000.0
-"""Radius of curvature that a plane wave, or a hollow one, is taken to have. [m]"""
+"""Radius of curvature that a plane wave, or a hollow one, is taken to have: beyond any room. [m]"""
 
 
 @runtime_checkable

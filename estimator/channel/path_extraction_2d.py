@@ -31,7 +31,8 @@ from estimator.wavefronts.wave_fit_2d import (
 )
 
 UNRESOLVED = 0.5
-"""Cells λ/D and c/B apart below which two waves are one. [-]"""
+"""Cells λ/D and c/B apart below which two waves are one: half the distance that Rayleigh resolves.
+[-]"""
 
 
 def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = True) -> PathSet:

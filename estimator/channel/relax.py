@@ -47,10 +47,11 @@ ROUNDING = 1e-9
 """Residual over the pilot, both rms, at which nothing but rounding is left. [-]"""
 
 SAME_WAVE = 0.98
-"""Normalised inner product of two waves from which the data cannot tell them apart. [-]"""
+"""Normalised inner product of two waves from which the data cannot tell them apart. Chosen, not
+measured. [-]"""
 
 MOST_PATHS = 8
-"""Number of paths at which the search ends, by default. [-]"""
+"""Number of paths at which the search ends, by default. Chosen, not measured. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,9 +22,10 @@ FAINTEST_ALIASED = 0.25
 """The same where neighbouring positions are more than λ/4 apart: at λ/2, grating lobes near the
 aperture reach −7.5 dB. [-]"""
 REGION = 0.1
-"""Intensity over a target's peak that still belongs to it. [-]"""
+"""Intensity over a target's peak that still belongs to it: −10 dB, inside of any main lobe. [-]"""
 WINDOW = 60
-"""Half the side of the neighbourhood of a peak in which its region is followed. [pixels]"""
+"""Half the side of the neighbourhood of a peak in which its region is followed, for time. Chosen,
+not measured. [pixels]"""
 WIDE = 4.0
 """Extent from which a target is more than a point, of which the tapered lobe spans 2.7 down to
 :data:`REGION`. [cells]"""
@@ -32,9 +33,11 @@ SHADOW = 0.1
 """Intensity over a brighter target's of what is out of focus before or behind it, along the same
 ray: with few frequencies the image is long in range, and only its ends are told apart. [-]"""
 SHADOW_CELLS = 2.0
-"""Distance across the ray within which something is before or behind another. [cells]"""
+"""Distance across the ray within which something is before or behind another: its main lobe, and
+half a cell by which either is off. Chosen, not measured. [cells]"""
 REPEATED_WITHIN = 2.0
-"""Distance from where a repetition would come from in which its origin is looked for. [cells]"""
+"""Distance from where a repetition would come from in which its origin is looked for: its main
+lobe, and half a cell by which either is off. Chosen, not measured. [cells]"""
 MOST_TARGETS = 24
 """Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
 """

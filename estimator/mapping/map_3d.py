@@ -23,7 +23,8 @@ from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall, unassigned_peaks
 
 TARGET_LEVEL = 1e-3
-"""Intensity, over that of the brightest target, of what still is one. [-]"""
+"""Intensity, over that of the brightest target, of what still is one: −30 dB. Chosen, not measured.
+[-]"""
 MOST_TARGETS = 24
 """Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
 """
@@ -36,7 +37,8 @@ are one: twice the survey's main lobe, which ends at 1.4. [cells]"""
 SAME_NORMAL = 0.95
 """Product of two normals from which walls within :data:`ON_PLANE` are one: 18°. [-]"""
 NEIGHBOURS = 9
-"""Side of the neighbourhood of a voxel in which it must not be a skirt. [pixels]"""
+"""Side of the neighbourhood of a voxel in which it must not be a skirt: 2 cells to either side hold
+the whole main lobe, which ends at 1.4. [pixels]"""
 SKIRT = 0.03
 """Intensity over the brightest voxel's in that neighbourhood (−15 dB), below which a voxel belongs
 to that one's main lobe: the lobe falls so far 0.93 cells from its peak. [-]"""

@@ -36,7 +36,7 @@ SIDELOBE = 1e-4
 """Intensity of a sidelobe over its peak: 10 dB above the taper's, for what roughness and a
 curved front add. [-]"""
 REGION = 0.1
-"""Intensity over a target's peak that still belongs to it. [-]"""
+"""Intensity over a target's peak that still belongs to it: −10 dB, inside of any main lobe. [-]"""
 WEAKEST = 1e-2
 """Intensity over that of the strongest ghost nearer to the array, seen over the same mirrors, from
 which on a later one counts: on full-wave data what is scattered between wall and targets more
@@ -48,14 +48,14 @@ ONE_PLACE = 2.0
 """Distance within which peaks are one or on one ray's or arc's sidelobes, and targets are one or on
 a wall: the survey's main lobe ends at 1.4, and a place is off by half a cell. [cells]"""
 WINDOW = 40
-"""Half the side of the neighbourhood of a peak. [pixels]"""
+"""Half the side of the neighbourhood of a peak, for time. Chosen, not measured. [pixels]"""
 WIDE = 2.0
-"""Extent of a target that is more than a point, over that of a point. [-]"""
+"""Extent of a target that is more than a point, over that of a point. Chosen, not measured. [-]"""
 POINT_WIDTH = 1.7
 """Extent of a point down to :data:`REGION`, over its half-power width: of any lobe that falls
 like a parabola in decibels, the square root of 10 dB over 3 dB is 1.8. [-]"""
 END_SHARE = 0.05
-"""Deviation of a short wall's end, over its length. [-]"""
+"""Deviation of a short wall's end, over its length. Chosen, not measured. [-]"""
 DEVIATION = 0.39
 r"""Deviation of a peak's place over cell and amplitude ratio, :math:`\sqrt{6}/2\pi`: the
 Cramér–Rao bound for a flat spectrum and an unknown phase. [-]"""

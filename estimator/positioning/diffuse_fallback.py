@@ -19,7 +19,8 @@ from estimator.results.estimate import UserEstimate
 from estimator.walls.fitted_line import FittedLine
 
 MOST_ENERGY = 0.5
-"""Share of the pilot's energy from which paths are not given up for what a wall scatters. [-]"""
+"""Share of the pilot's energy from which paths are not given up for what a wall scatters: most of
+it. Chosen, not measured. [-]"""
 
 CELLS_APART = 3.0
 """Cross-range cells λR/D from a strong path's place at which the diffuse field contradicts it:
@@ -29,7 +30,8 @@ ALONE, BEHIND = 0.8, 0.05
 """Probability of a place that one wall's scattering alone tells, and of its image behind it: 13 of
 the 90 answers found in 288 random rooms were such ones and wrong. [-]"""
 TOGETHER = 0.9995
-"""Probability of a place that scattering off two walls, or scattering and a path, tell. [-]"""
+"""Probability of a place that scattering off two walls, or scattering and a path, tell: above what
+makes a place certain. Chosen, not measured. [-]"""
 
 UNSTATED = 0.5
 """Probability of an answer that states none: nothing is known for or against it. [-]"""

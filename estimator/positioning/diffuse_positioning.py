@@ -38,13 +38,14 @@ SIDELOBES = 10**-4.5
 """Intensity, over the largest one, that sidelobes of the taper may have near the main lobe. [-]"""
 
 SAMPLES_PER_CELL = 4
-"""Samples of the distance for each range cell c/B. [-]"""
+"""Samples of the distance for each range cell c/B: twice what the sampling theorem asks of
+the intensity, for splines between them. [-]"""
 
 POINTS_PER_CELL = 2.0
-"""Points of a wall for each cross-range cell. [-]"""
+"""Points of a wall for each cross-range cell: as the sampling theorem asks. [-]"""
 
 COARSEST = 0.064
-"""Width of the first cells of the search. [m]"""
+"""Width of the first cells of the search: how coarse they are decides on time. [m]"""
 
 MOST_CELLS = 60_000
 """Most cells of one level, for memory; the best ones are kept. [-]"""
@@ -60,7 +61,8 @@ FEWEST_LIT = 0.5
 """Share of some wall's points that must be lit: a mirror-like path lights a few only. [-]"""
 
 PARALLEL = float(np.cos(np.radians(10.0)))
-"""Cosine between the normals of walls that count as parallel. [-]"""
+"""Cosine between the normals of walls that count as parallel: within 10°. Chosen, not measured.
+[-]"""
 
 STRETCHES = 12
 """Stretches of a wall whose distances are told apart. [-]"""
@@ -77,7 +79,8 @@ ROUNDS = 4
 """Trilaterations, each from the place of the last: Gauss-Newton steps; chosen, not measured. [-]"""
 
 RIVAL = 0.9
-"""Score, over the best one (both less the mean score), that makes a place a rival. [-]"""
+"""Score, over the best one (both less the mean score), that makes a place a rival. Chosen, not
+measured. [-]"""
 
 RIVAL_APART = 6.0
 """Distance from the best place, in its deviations, beyond which a place is another one. [-]"""

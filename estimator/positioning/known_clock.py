@@ -29,7 +29,8 @@ from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
 NEGLIGIBLE = 1e-6
-"""Probability of a place below which it is not named. [-]"""
+"""Probability of a place below which it is not named: a thousandth of the doubt in a certain one.
+[-]"""
 UNSEEN_SOMEWHERE = (
     "the path is weaker than a direct one, or comes from where little is shown: a wall that the "
     "image does not show may have reflected it"

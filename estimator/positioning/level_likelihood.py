@@ -24,14 +24,16 @@ from estimator.channel.path import Path
 from estimator.prediction.wall_reflection import ASSUMED_DB, ASSUMED_DEVIATION_DB, excess_db
 
 ISOTROPIC = 0.5
-"""Prior probability that a user's antenna is an isotropic one. [-]"""
+"""Prior probability that a user's antenna is an isotropic one: nothing is known of it. [-]"""
 LEAST_DB, MOST_DB = -40.0, 25.0
-"""Gains towards the array that other antennas may have. [dBi]"""
+"""Gains towards the array that other antennas may have: from a deep null to the main lobe of a
+horn. Chosen, not measured. [dBi]"""
 LEVEL_DEVIATION_DB = 0.1
 """Standard deviation of a strong path's level. Of 17 direct paths of tuning rooms all were 0.03 to
 0.08 dB over free space at the centre of the band. [dB]"""
 BLOCKED = 0.2
-"""Probability that something blocks the straight way to a user whom a mirror shows. [-]"""
+"""Probability that something blocks the straight way to a user whom a mirror shows. Chosen, not
+measured. [-]"""
 SMOOTH_METAL = 1 / 4
 """Probability that a mirror is a conductor too smooth to lose anything, and to be seen: a third of
 the materials of the random rooms are metal, of which rough ones lose more than 0.1 dB. [-]"""

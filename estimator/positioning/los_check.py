@@ -27,10 +27,11 @@ BESIDE = 2.0
 """Distance beside a ray within which a peak is on it, as for a line
 (:data:`estimator.walls.line_relations.BESIDE`). [cells]"""
 USER_SIZE = 0.05
-"""Distance before the end of a path within which the user's own body may echo. [m]"""
+"""Distance before the end of a path within which the user's own body may echo. Chosen, not
+measured. [m]"""
 LONGEST_UNSEEN = 0.5
 """Distance of two loose points beyond which they are not taken for the ends of one mirror on a leg
-that the array does not look along. [m]"""
+that the array does not look along. Chosen, not measured. [m]"""
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall

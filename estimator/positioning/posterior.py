@@ -34,7 +34,8 @@ from estimator.positioning.weighted_least_squares import Consensus
 from estimator.prediction.wall_reflection import excess_db
 
 CERTAIN = 0.999
-"""Posterior probability of a place from which it is ``found``. [-]"""
+"""Posterior probability of a place from which it is ``found``: one wrong answer in a thousand,
+where the model holds. [-]"""
 
 UNSEEN = 0.05
 """Prior probability that a strong path which seems direct comes over a mirror that the map does not
@@ -72,9 +73,10 @@ UNEXPLAINED = 0.1
 that is stronger it falls with the fourth power of the ratio: a quarter of the energy does not
 decide (1 in 1000). [-]"""
 FEEBLE = 0.25
-"""Share of energy, over the strongest path's, below which an unexplained path is usual. [-]"""
+"""Share of energy, over the strongest path's, below which an unexplained path is usual. Chosen, not
+measured. [-]"""
 USUAL = 0.5
-"""Prior probability of those: scattering by edges and rough patches. [-]"""
+"""Prior probability of those: scattering by edges and rough patches. Chosen, not measured. [-]"""
 EARLIER = 1e-5
 """Probability that a path which passes for a mirror's is there before the direct one: no way is
 shorter than the straight one, and what is taken for one then is none. [-]"""
@@ -85,7 +87,8 @@ BESIDE_CELL = 3.0
 fitted by two. [cells]"""
 
 PART = 0.1
-"""Share of energy, over a path's, from which another beside it is a part of the same wave. [-]"""
+"""Share of energy, over a path's, from which another beside it is a part of the same wave: a tenth
+moves its level by 0.4 dB. [-]"""
 
 RINGS = (0.25, 0.5, 0.75, 1.0)
 """Angles beside a path's own, over its reach of two deviations, at which its ray is tried: half a

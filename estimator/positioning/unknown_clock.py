@@ -28,10 +28,11 @@ from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
 RIVAL = 0.25
-"""Share of energy, over the answer's, from which a contradicting path makes it ambiguous. [-]."""
+"""Share of energy, over the answer's, from which a contradicting path makes it ambiguous: half the
+amplitude. Chosen, not measured. [-]"""
 SHARP = 10.0
 """A position known this many times better than the distance of its alternative cannot have
-been hit by chance: two paths agree there. [-]."""
+been hit by chance: two paths agree there. [-]"""
 
 
 def on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:

@@ -35,7 +35,8 @@ CONVERGED = 1e-12
 AGREE = 1 - false_alarm.DISAGREEMENT
 """Probability with which true paths pass the test that they agree. [-]"""
 FLATTEST = 1e-3
-"""Least curvature from which a search for a user's place is begun. [1/m]"""
+"""Least curvature from which a search for a user's place is begun: a kilometre, beyond any room.
+[1/m]"""
 
 
 @dataclass(frozen=True, kw_only=True)

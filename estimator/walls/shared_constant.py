@@ -19,7 +19,7 @@ from estimator.measurement.constant_signal import PROPOSED_DB
 from estimator.measurement.model import Echo
 
 FEWEST = 8
-"""Positions of which a mean tells anything. [-]"""
+"""Positions of which a mean tells anything. Chosen, not measured. [-]"""
 ONE_DELAY = 0.95
 """Share of the constant's energy that one delay explains, from which it may be a plate: mismatch
 and offsets vary over the band. [-]"""
@@ -29,7 +29,8 @@ less, a far point is a constant as well, and nothing is taken out. [rad]"""
 CONFIDENCE = 0.9
 """Confidence of a mirror of which only this is known: below what is reported as certain. [-]"""
 OVERSAMPLED = 8
-"""Delays tried for each range cell. [-]"""
+"""Delays tried for each range cell: the summit of a parabola between them is good to a thousandth.
+[-]"""
 MULTIPLE_LEVEL = 3.0
 """Magnitude over the profile's median from which a multiple is counted: of Rayleigh noise one delay
 in 500 has it. It is only told, and decides nothing. [-]"""

@@ -51,7 +51,8 @@ STANDS_OUT = 0.25
 """Share of the energy that arrives around its distance that a flat wave must explain: chance
 makes flat waves of the speckle of a rough wall, but faint ones. [-]"""
 SKIRT = 2.5
-"""Distance from a wall within which a peak belongs to it. [cells]"""
+"""Distance from a wall within which a peak belongs to it: the main lobe, which ends at 1.4, and a
+cell that the wall is off. Chosen, not measured. [cells]"""
 DEVIATIONS = 6.0
 """Deviations by which the curvature may miss 0, or must miss a point's. The covariance is estimated
 from 25 tiles of the array, of which a few may hold most of the speckle. [-]"""
@@ -59,14 +60,16 @@ BEAMS_APART = 3.0
 """Distance of peaks that are looked at each for a flat wave of its own: a wall's own flash is as
 wide as the array, which near it is a few beams. [cells λ/2D]"""
 GATE_CELLS = 4.0
-"""Range beyond the array's extent that is kept for the fit of a flat wave. [cells c/2B]"""
+"""Range beyond the array's extent that is kept for the fit of a flat wave: its main lobe, and what
+the peak is off. Chosen, not measured. [cells c/2B]"""
 ROUNDEST = 1.5
 """Largest curvature tried, over that of a point at the distance: what is rounder is no wall. [-]"""
 SAME_DIRECTION = 0.1
 """Distance of two unit vectors, with lengths within half the array, below which two flat waves are
 one: 6°. Two walls as near to each other in both would cross before the array. [-]"""
 LOBE_CELLS = 1.5
-"""Distance from a wall's plane at which its grating lobe's origin may lie. [cells]"""
+"""Distance from a wall's plane at which its grating lobe's origin may lie: the main lobe, which
+ends at 1.4. [cells]"""
 MOST = 0.5
 """Share of points, or of intensity, from which most of something is meant. [-]"""
 FLASH_CELLS = 4.0

@@ -5,7 +5,8 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 REACH = 2.5
-"""Half width of the square around the anchors in which positions are sought. [m]"""
+"""Half width of the square around the anchors in which positions are sought: beyond the rooms
+compared. [m]"""
 STARTS = 4
 """Places on each side of the square from which the search descends. [-]"""
 CONVERGED = 1e-12

@@ -23,7 +23,8 @@ from simulator.scene.radio_scene import RadioScene, facet_ports, radio_scene
 from validation.analytic.point_scatterer import complex_noise
 
 LEVEL_ELEMENTS = 17
-"""Elements of our array, evenly spread, over which its noise's level is taken. [-]"""
+"""Elements of our array, evenly spread, over which its noise's level is taken: the mean over 17
+that fade independently is known to a decibel. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
