@@ -1,4 +1,4 @@
-"""Where an array of any shape looks: the frame its image is formed in, and what is in front of it.
+"""The image frame of an array of any shape, and the half space that it images.
 
 A line images the plane that it shares with its boresight, a plane the space before it. Positions
 around the scene (a circle, an arc, a cylinder) have no front: they image what they stand around.

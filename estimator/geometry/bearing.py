@@ -1,8 +1,8 @@
-r"""What an array measures of the direction in which it sees a place, and how that changes with it.
+r"""The bearing that an array measures of a point's direction, and its derivatives.
 
 A linear array tells the angle θ from its axis, and solves for a place in its plane; a planar array
 tells the cosines :math:`(a_x, a_z)` of the direction along its axes, and solves for a place in
-space. All that places a user is written for either.
+space. All positioning code works with either.
 """
 
 from typing import Protocol, runtime_checkable

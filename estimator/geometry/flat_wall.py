@@ -1,4 +1,4 @@
-"""What a flat wall must answer, in the plane or in space, for paths to be followed over it."""
+"""The interface of a flat wall, in 2-D or 3-D, that ray tracing and ghost unfolding need."""
 
 from typing import Protocol, runtime_checkable
 

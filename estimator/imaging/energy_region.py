@@ -1,4 +1,4 @@
-r"""Where an echo's energy is: the box that is worth an image, found from coarse to fine.
+r"""The box that holds an echo's energy, and so is to be imaged: a coarse-to-fine search.
 
 The range profiles of single positions tell how far away anything is. Within that, small parts of
 the aperture and of the band are focused on a coarse grid, and their intensities added: a part that

@@ -1,7 +1,7 @@
 """A linear array's look around a direction beyond the angles without grating lobes.
 
-There the image shows all that there is, and grating lobes of what is elsewhere besides. It cannot
-tell that something stands there, but that nothing does.
+There the image shows real scatterers and also grating lobes of scatterers elsewhere. A peak is
+therefore no proof of a scatterer, but the absence of peaks shows that nothing is there.
 """
 
 import numpy as np

@@ -66,7 +66,7 @@ def peaks_above(
 
 
 def vertex_shift(before: float, at: float, after: float) -> float:
-    """Return how far a parabola through three samples has its summit from the middle one.
+    """Return the offset of the vertex of a parabola through three samples from the middle one.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def vertex_shift(before: float, at: float, after: float) -> float:
 
     Returns
     -------
-    In steps; 0 where the parabola has no summit. [-]
+    In steps; 0 where the parabola has no vertex. [-]
     """
     bend = before - 2 * at + after
     return 0.5 * (before - after) / bend if bend < 0 else 0.0

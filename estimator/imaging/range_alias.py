@@ -1,4 +1,4 @@
-r"""Things beyond the unambiguous range c/2Δf: the curvature of what is imaged tells how far it is.
+r"""Detection of range ambiguities: echoes from beyond c/2Δf by their wavefront's curvature.
 
 At range r the image shows, too, what stands at r + n c/2Δf, with the same profile at every
 antenna. But a wavefront from there is flatter: over the aperture its round trip differs from that
@@ -8,8 +8,8 @@ of a point at r by
           - 2 \left( \lVert q - p \rVert - \lVert p \rVert \right) ,
           \qquad p_n = p \, \frac{\lVert p \rVert + n c / 2 \Delta f}{\lVert p \rVert} ,
 
-so that echoes are focused best at their true range. A mirror that faces the array returns a wave
-without any curvature; it is told by that.
+so that echoes are focused best at their true range. A mirror that faces the array returns a plane
+wave, which distinguishes it from both.
 """
 
 from dataclasses import dataclass
@@ -72,7 +72,8 @@ class FocusByRange:
     ) -> Bool[np.ndarray, " points"]:
         """Tell which points are beyond the unambiguous range, each with its neighbours.
 
-        One peak of a speckle does not tell: what shares its cell bends its wavefront either way.
+        A single speckle peak is not conclusive: scatterers in the same cell interfere, which may
+        increase or decrease the curvature of its wavefront.
 
         Parameters
         ----------

@@ -117,7 +117,8 @@ def _faces(
 ) -> Bool[np.ndarray, " peaks"]:
     """Tell which peaks belong to a surface that faces the array and so reflects it.
 
-    All of it has nearly one range: its peaks disturb each other, and their bends mean nothing.
+    All its points have nearly the same range: their peaks interfere, so that the curvature of a
+    single peak's wavefront is not meaningful.
     """
     belongs = np.zeros(len(peaks), dtype=bool)
     for flash in np.flatnonzero(as_mirror >= REFLECTED):

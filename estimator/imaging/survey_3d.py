@@ -169,8 +169,8 @@ def peaks_around(
 ) -> Float[np.ndarray, "peaks 3"]:
     """Find the peaks of the image around a direction beyond the angles without grating lobes.
 
-    There the image shows all that there is, and grating lobes of what is elsewhere besides. It
-    cannot tell that something stands there, but that nothing does.
+    There the image shows real scatterers and also grating lobes of scatterers elsewhere. A peak
+    is therefore no proof of a scatterer, but the absence of peaks shows that nothing is there.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From a measurement to mirrors, targets and users: the estimator's whole way through.
+"""From a measurement to mirrors, targets and users: the estimator's complete pipeline.
 
 :func:`locate` runs the stages: image, walls, map, paths, positions. It sees a measurement and
 nothing else: no scene, no truth.

@@ -1,4 +1,4 @@
-"""What is said of arrays and sweeps too coarse to image all angles and ranges."""
+"""Notes on arrays and sweeps whose steps are too coarse to image all angles and ranges."""
 
 import numpy as np
 from jaxtyping import Bool, Float

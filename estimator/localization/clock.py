@@ -1,4 +1,4 @@
-"""The user's clock: a known offset is taken out of the pilot, an unknown one is found and told."""
+"""The user's clock offset: a known one is corrected, an estimated one is reported."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Whether a scene lies as near as its aperture is long, or an array is too large for a room."""
+"""Tests whether a scene is nearer than the aperture's length, or the array too large for a room."""
 
 import numpy as np
 from scipy.constants import speed_of_light

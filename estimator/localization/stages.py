@@ -1,4 +1,4 @@
-"""What the way through needs of an array's shape: its frame, its map, its paths, its images.
+"""The interface of the stages that depend on the array's shape: frame, map, paths, images.
 
 :mod:`estimator.localization.stages_2d` has it of linear arrays, :mod:`stages_3d` of planar ones.
 """

@@ -32,8 +32,9 @@ def corrected_image(
     """Focus the echo on points where things really are.
 
     The raw image shows a point at its image over each chain of mirrors over which the array (at
-    the origin) sees it. The brightest of these is kept, as the raw image has it: values are
-    focused there, neither interpolated nor added up.
+    the origin) sees it. The value of the brightest image point is kept; it is focused exactly
+    there, without
+    interpolation, and views over different chains are not added.
 
     Parameters
     ----------

@@ -232,8 +232,9 @@ def _is_cloud(
 ) -> bool:
     """Tell whether a peak is speckle of the cloud around a stronger target's ghost.
 
-    In a cloud, only what outshines all of its speckle that is known as such by its bend counts;
-    and nothing if the array is too short to tell a bend there.
+    Inside a cloud, a peak counts only if it is brighter than every peak that its excess wavefront
+    curvature identifies as speckle; none counts if the array is too short to resolve that
+    curvature.
     """
     for other in kept:
         doors = [line for line in found if _before(line, other.place)]
@@ -374,7 +375,7 @@ def _is_known(
 def _is_mixed(
     target: Target, targets: Sequence[Target], walls: Sequence[Wall], coarse: Resolution
 ) -> bool:
-    """Tell whether a target is a stronger one seen one way on the way out, another way back."""
+    """Tell whether a peak is a stronger target, illuminated and received over different chains."""
     reach = 2 * float(np.linalg.norm(target.ghost))  # the mean of two ranges is the target's
     chains = list(possible_chains(walls, reach=reach))
     for other in targets:

@@ -1,4 +1,4 @@
-r"""What all positions share: the antenna's own mismatch, a leak, a converter's offset.
+r"""The signal common to all positions: antenna mismatch, leakage, a converter's offset.
 
 The part of the samples that does not depend on the position, its coherent mean, is no echo of
 anything that the aperture could focus; only a plate that faces the whole aperture gives one. With

@@ -122,12 +122,12 @@ def with_diffuse_search(
 def _weighed(
     diffuse: UserEstimate, fix: DiffuseFix, walls: Sequence[SeenWall], answer: UserEstimate
 ) -> UserEstimate:
-    """Take a place by diffuse scattering alone for found if several walls tell it.
+    """Accept a position from diffuse scattering alone only if several walls support it.
 
-    All distances from a straight wall are the same for a place and its mirror image behind it, from
-    where edges and thin walls let the pilot through; and one wall with an error, or that is none,
-    puts the user wrongly without a contradiction. Two that are not parallel contradict each other
-    then.
+    All distances from a straight wall are the same for a position and its mirror image behind the
+    wall, from where the pilot may arrive around edges or through thin walls. A single wall that is
+    misplaced or falsely detected gives a wrong position without a contradiction; two walls that are
+    not parallel then contradict each other.
     """
     if fix.several:
         return replace(diffuse, probability=TOGETHER)
@@ -164,7 +164,7 @@ def _weighed(
 
 
 def _settled(answer: UserEstimate) -> bool:
-    """Tell whether several paths agree already: what a wall scatters is not needed then."""
+    """Tell whether several paths already agree, so that no diffuse search is needed."""
     return answer.status == "found" and sum(path.used for path in answer.paths) > 1
 
 

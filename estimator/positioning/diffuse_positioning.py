@@ -380,7 +380,7 @@ def _rivals(
     place: Float[np.ndarray, " 2"],
     covariance: Float[np.ndarray, "2 2"],
 ) -> Float[np.ndarray, "rivals 3"]:
-    """Other places that explain the pilot nearly as well: summits of their own, not one's slope."""
+    """Other positions that explain the pilot nearly as well: separate local maxima. [m]."""
     chance = float(np.median(anchors.scores)) * len(anchors.scores)
     left = scores >= chance + RIVAL * (float(scores.max()) - chance)
     apart = RIVAL_APART * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))

@@ -1,8 +1,9 @@
-"""A user on the base station's clock: the place that holds the posterior, or all that share it.
+"""A user synchronised with the base station: its position by the posterior over hypotheses.
 
-:mod:`estimator.positioning.posterior` weighs all consistent hypotheses, and that the truth is none
-of them. A place that holds 0.999 of the posterior is the answer, paths that it does not explain are
-dropped; else it is ambiguous, and all places are told with their probabilities.
+:mod:`estimator.positioning.posterior` weighs all consistent hypotheses, and the hypothesis that
+none of them is true. A position with at least 0.999 of the posterior is the answer, and paths that
+it does not explain are dropped; otherwise the answer is ambiguous and lists all positions with
+their probabilities.
 """
 
 from collections.abc import Mapping, Sequence
@@ -83,7 +84,7 @@ def _decided(
     chains: Chains,
     chances: Mapping[int, Mapping[Chain, float]],
 ) -> UserEstimate:
-    """Answer by the posterior over all explanations, and that it is none of them."""
+    """Decide by the posterior over all explanations, "none of them" included."""
     logs = [log_weight(one, found, room, chances) for one in consistent]
     ways: dict[int, StraightWay] = {}
     odds = []
@@ -139,7 +140,7 @@ def _decided(
 def _places(
     consistent: Sequence[Consensus], shares: Float[np.ndarray, " weights"], how: Bearing
 ) -> list[tuple[int, float]]:
-    """Put explanations of one place together: the likeliest of each, and their probability."""
+    """Group explanations by position: index of the likeliest and total probability of each."""
     places: list[tuple[int, float]] = []
     for index in np.argsort(-shares, kind="stable"):
         for number, (first, share) in enumerate(places):

@@ -1,4 +1,4 @@
-"""Whether a path that seems direct is in line of sight: mirrors that the image does not show.
+"""Test of line of sight for a path that seems direct: mirrors that the image does not show.
 
 A wall too smooth for a diffuse echo shows at its two ends only, and reflects all the better; a
 short one shows as a few peaks without a direction; in an echo that is nearly all noise no wall
@@ -41,7 +41,7 @@ rest is margin for walls that are farther or smoother. [-]"""
 
 @dataclass(frozen=True, kw_only=True)
 class StraightWay:
-    """What the image shows on the straight way of a path that seems direct."""
+    """What the image shows on the straight line between the array and the end of a path."""
 
     sight: Sight
     doubt: str | None  # why something may be on it, for a person to read; None if it is clear
@@ -49,7 +49,7 @@ class StraightWay:
 
 
 def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing) -> StraightWay:
-    """Look for mirrors on the straight way that the map does not show.
+    """Look for mirrors that the map does not show on the straight line from the array to a user.
 
     Parameters
     ----------
@@ -119,10 +119,10 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
 
 
 def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how: Bearing) -> Sight:
-    """Look for mirrors between two loose points on the legs of a path beyond its first mirror.
+    """Look for mirrors between two unassigned peaks that cross a path beyond its first mirror.
 
-    In the plane only: in space two of the loose points are at some leg by chance too often to mean
-    a mirror, and how often was not measured yet.
+    In the plane only: in space, two unassigned peaks lie near some segment of the path by chance
+    too often to indicate a mirror; this rate has not been measured yet.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how
 
 
 def hides_walls(contrast: float) -> bool:
-    """Tell whether an image without a wall shows too little to say that there is none.
+    """Tell whether an image without walls has too little contrast to exclude a wall.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def hides_walls(contrast: float) -> bool:
 
 
 def too_noisy(contrast: float) -> str:
-    """Say why an image that shows no wall does not mean that there is none."""
+    """Return a message: the echo is too noisy for the image to exclude a wall."""
     return (
         f"the brightest point of the echo's image is {10 * np.log10(max(contrast, 1.0)):.0f} dB "
         f"above its noise, and below {10 * np.log10(LEAST_IMAGE_CONTRAST):.0f} dB walls may not "

@@ -1,4 +1,4 @@
-"""What the echo told of the room that a user's paths are placed in, in the plane or in space."""
+"""The map as input of positioning: walls, resolution and imaged region, in 2-D or 3-D."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

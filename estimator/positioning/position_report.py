@@ -1,4 +1,4 @@
-"""A user's answer in numbers: the place, the path to it, and what became of every other path."""
+"""A user's result: its position, the path to it, and the use or rejection of each other path."""
 
 from collections.abc import Sequence
 from dataclasses import replace

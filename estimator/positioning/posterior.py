@@ -1,4 +1,4 @@
-r"""How probable each explanation of a user's paths is, and whether one place holds them all.
+r"""Posterior probability of each explanation of a user's paths.
 
 An explanation h says over which mirrors some of the paths come; the others it leaves unexplained.
 With the paths' bearings and lengths z, their covariance S (walls' errors in it), a flat prior over
@@ -8,11 +8,13 @@ places u, and the level e of each path,
           \prod_{i \in h} p(e_i \mid n_i) \prod_{k} \frac{q_k}{\pi L} .
 
 The second product is over the paths k that are left. The integral is that of a Gaussian about the
-least squares solution: paths that agree without need weigh a million times what one of them does
-alone. :math:`\pi_h` is the probability that the rays meet the walls' extents as h says. Beside the
-explanations that the map offers stands *none of them*: that a path came over one more mirror, which
-the map does not show. It weighs by a prior, by what the image shows where that mirror would have to
-be, and by the level: a mirror takes some.
+least-squares solution (Laplace's approximation):
+several paths that agree on one position weigh about a million times as much as one of them alone,
+because independent paths would rarely agree by chance. :math:`\pi_h` is the probability that the
+rays hit the walls within their extents as h says. A further hypothesis is *none of them*: a path
+was reflected by one more mirror, which the map does not show. Its weight is the product of a
+prior, of what the image shows where that mirror would have to be, and of the likelihood of the
+path's level, since each reflection attenuates.
 """
 
 from collections.abc import Mapping, Sequence
@@ -163,10 +165,10 @@ def log_weight(
 
 
 def level_of(path: Path, found: PathSet, room: MapContext) -> float | None:
-    """Return a path's excess over free space; None if it tells nothing. [dB].
+    """Return a path's level over that of free space; None if it is not informative. [dB].
 
-    Of a wave that roughness bends so that it was fitted by two, it is all of the pilot's power that
-    other paths do not hold.
+    A wavefront distorted by roughness may have been fitted by two waves: then the level is that of
+    all the pilot's power that the other paths do not hold.
     """
     parts = [other for other in found.paths if other is not path and beside(path, other, room)]
     if not any(other.share > PART * path.share for other in parts):

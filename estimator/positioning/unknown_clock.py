@@ -1,4 +1,4 @@
-"""A user whose clock is unknown: two paths tell its offset, one leaves it open.
+"""A user with an unknown clock offset: two paths determine it, one path alone does not.
 
 The hypothesis that explains most energy is the answer, paths that it does not explain are dropped,
 and it is ambiguous if another consistent one explains nearly as much elsewhere.
@@ -36,7 +36,7 @@ been hit by chance: two paths agree there. [-]"""
 
 
 def on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
-    """Find the clock's offset from two paths, or say what one path leaves open."""
+    """Estimate position and clock offset from two paths; ambiguous with one path only."""
     chains = {
         index: _chains(path.radius, path, room, found.how) for index, path in enumerate(found.paths)
     }
@@ -126,9 +126,10 @@ def _rivals(
 def _comes_unseen(rival: Consensus, best: Consensus, found: PathSet, room: MapContext) -> bool:
     """Tell whether a rival's paths may come over walls that the image cannot show.
 
-    Floor and ceiling stand outside of the angles that most planar arrays image. What arrives from
-    there contradicts nothing, if it is the longer way: no place farther off than one of the
-    answer's paths is long can be the user's.
+    Floor and ceiling lie outside the angles that most planar arrays image. A path from there that
+    is
+    longer than the answer's paths is no contradiction: the user cannot be farther away than the
+    length of its shortest path.
     """
     late = speed_of_light * (best.clock_offset or 0.0)
     shortest = min(found.paths[one.path].wave.path_length for one in best.sightings) + late

@@ -124,7 +124,8 @@ def solve_position(
             weighted = np.linalg.solve(root, slopes / scale[:, None])
             errors = np.linalg.solve(root, left.ravel() / scale)
             step = np.linalg.lstsq(weighted, errors)[0]
-            # Far from the place the linear model overshoots: never by more than the way there.
+            # Far from the solution the linear model overshoots: the step is limited to the
+            # distance.
             step = step / max(1.0, float(np.linalg.norm(step[: len(axes)])) / farthest)
             unknowns = unknowns + step
             if np.linalg.norm(step) < CONVERGED:

@@ -1,4 +1,4 @@
-r"""A user that moves: a track through the positions that single measurements gave.
+r"""A moving user's track from the positions of single measurements, by multiple hypotheses.
 
 The motion is that of :mod:`estimator.tracking.constant_velocity`: filtered forward, smoothed back.
 

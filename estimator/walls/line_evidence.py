@@ -1,6 +1,4 @@
-r"""Is a line of the image a wall? What a row of scatterers on it explains, and what it cannot.
-
-Two questions, each to the echo itself:
+r"""Two tests on the echo whether a line of the image is a wall.
 
 *Explained share*. The row's strengths are fitted to all range profiles by least squares, as in
 :mod:`estimator.walls.line_fit_echo`. Echo and residual are then focused on cells along the line and

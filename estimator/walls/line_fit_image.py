@@ -143,7 +143,7 @@ def fit_between(
 
     Returns
     -------
-    The line, or ``None`` if it is too short to have an angle, or its brightness no summit.
+    The line; ``None`` if it is too short to have an angle or its brightness has no maximum.
     """
     if places_along(start, end, resolution).size < FEWEST_PLACES:
         return None

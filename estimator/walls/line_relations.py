@@ -97,7 +97,7 @@ def seen_twice(
 ) -> list[FittedLine]:
     """Return the doubtful lines that are seen directly and, mirrored, over a known wall.
 
-    Neither clouds nor ambiguities have an image just where a wall would show it.
+    Diffuse clouds and grating lobes have no mirror image at the place where a wall has one.
 
     Parameters
     ----------

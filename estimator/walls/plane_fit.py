@@ -7,9 +7,10 @@ plane,
 
 is maximised over two tilts and the offset. Each point's magnitude is sampled along the normal
 and replaced by the parabola that fits best over most of a cell; the sum of parabolas is a
-paraboloid in the three unknowns, and its summit follows in closed form. Off the plane the samples
-follow each cell's own slant, not n: else every change of the brightness along the wall would move
-the summit. The covariance is the sandwich over tiles of the wall, each with a speckle of its own.
+paraboloid in the three unknowns, and its maximum follows in closed
+form. Off the plane the samples are taken along each resolution cell's own oblique axis, not
+along n: otherwise every change of the brightness along the wall would shift the maximum. The
+covariance is the cluster-robust one ("sandwich") over tiles of the wall with independent speckle.
 """
 
 from dataclasses import dataclass, replace
@@ -118,7 +119,7 @@ def towards_array(
 
 
 def refine_plane(focus: Focus, wall: PlaneWall, resolution: Resolution) -> PlaneWall | None:
-    """Move a plane to the summit of J over its polygon.
+    """Move a plane to the maximum of J over its polygon.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ def refine_plane(focus: Focus, wall: PlaneWall, resolution: Resolution) -> Plane
 
     Returns
     -------
-    The plane with its covariance; ``None`` if J has no summit nearby.
+    The plane with its covariance; ``None`` if J has no maximum nearby.
     """
     for width in (FIRST_WIDTH, *[SUMMIT] * ROUNDS):
         cell = float(resolution.cell(wall.centre, wall.normal))
@@ -163,13 +164,13 @@ def refine_plane(focus: Focus, wall: PlaneWall, resolution: Resolution) -> Plane
 def _conjugate(
     points: Float[np.ndarray, "points 3"], normal: Float[np.ndarray, " 3"], resolution: Resolution
 ) -> Float[np.ndarray, "points 3"]:
-    r"""Return the ways off a plane on which cells stay over the same part of it.
+    r"""Return the directions off a plane along which a cell stays over the same part of it. [-].
 
-    A cell is longer across the ray than along it, and so leans to a plane that is seen at a slant:
-    away from it along the normal, the cell is centred over another part of the plane. Where that
-    is brighter, the summit of the magnitude is off the plane; under a beam, whose brightness falls
-    to all sides, the whole plane then seems turned. With the cell's squared half widths C, the
-    direction :math:`C n / (n^T C n)` has neither.
+    A resolution cell is longer across the ray than along it, so it is oblique to a plane at oblique
+    incidence: a cell displaced along the normal n is centred over another part of the plane. Where
+    that part is brighter, the maximum of the magnitude lies off the plane; with an antenna beam,
+    whose brightness decreases on all sides, the whole fitted plane is then tilted. The direction
+    :math:`C n / (n^T C n)`, with the cell's squared half widths C, avoids both errors.
     """
     reach = np.linalg.norm(points, axis=-1, keepdims=True)
     ray = points / reach
@@ -189,7 +190,7 @@ def points_on(
     lines = [np.arange(a + s / 2, b, s) for a, b, s in zip(low, high, step, strict=True)]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
     points = wall.centre + places @ wall.axes
-    # Without the rim: the sidelobes of an end, which lean, would tilt the plane.
+    # Without the rim: the oblique sidelobes of the wall's ends would tilt the plane.
     rim = min(CELLS_CUT * float(np.max(2 * step)), MOST_CUT * float((high - low).min()))
     inside = within(points, wall, margin=-rim)
     return places[inside], points[inside]

@@ -1,9 +1,10 @@
-r"""What all positions receive alike: a plate parallel to the array, or an instrument's constant.
+r"""The echo common to all positions: a plate parallel to the array, or an instrument's constant.
 
 A mirror that faces the array returns the same to each position, :math:`\lambda / (8 \pi d)\,
 e^{-2jkd}`; so do a mismatch of the antenna, leakage between antennas, and a receiver's offset.
-Tilt, edges and roughness would tell a plate. Where the echo has none of these, two signs are left:
-a plate's samples have one delay over the band, and repeat at its multiples. That is no proof.
+Tilt, edges and roughness would identify a plate. Where the echo shows none of these, two
+indications remain: a plate has one delay over the whole band, and multiple reflections at
+multiples of it. They are no proof.
 """
 
 from dataclasses import dataclass, replace

@@ -1,9 +1,9 @@
-"""What a fit of waves raises where there are none to be fitted."""
+"""The error that a wave fit raises when it does not converge to a wave."""
 
 
 class NoWaveError(ArithmeticError):
-    """No summit of the likelihood near a start, or two waves that became one.
+    """The likelihood has no maximum near a start, or two waves converged to the same one.
 
-    A search for waves ends there: what is left of the pilot or the echo is no wave. Any other
-    error of the arithmetic is a fault, and is let out.
+    A search for waves stops at this error: the residual of the pilot or the echo holds no further
+    wave. Other numerical errors are faults of the program and are not caught.
     """
