@@ -1,4 +1,4 @@
-"""The truth: scenarios, their shapes with frozen roughness, and the library of them.
+"""Scenarios, the ground truth: shapes, frozen rough surfaces, and a library of examples.
 
 World frame, right-handed, metres: x cross-range (along a linear array), y range
 (boresight), z up. Files and the command line use degrees, GHz and mm, with the unit in the

@@ -1,4 +1,4 @@
-"""Random numbers: every stream is its own, so a new user or SNR does not redraw the wall."""
+"""Independent named random streams: another user or SNR does not change the drawn wall."""
 
 import hashlib
 

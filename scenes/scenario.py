@@ -1,4 +1,4 @@
-"""Scenarios: what a scene is made of, typed and checked; the truth that only we know.
+"""Scenarios: typed and checked models of a scene, the ground truth of a simulation.
 
 Keys carry their units (GHz, mm, m, degree, dB); the properties are SI and radians.
 """
@@ -112,7 +112,7 @@ class Scenario(Checked):
 
     @model_validator(mode="after")
     def _possible(self) -> "Scenario":
-        # In this order: each step relies on what those before have found sound.
+        # In this order: each check relies on those before it.
         found = [
             *dimension_problems(
                 dimensions=self.dimensions,
@@ -178,7 +178,7 @@ class Scenario(Checked):
         return facet_spacing(self.objects[name], self.radio.shortest_wavelength)
 
     def aim(self, antenna: Antenna, position: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-        """Return the unit vector in which an antenna at that position looks.
+        """Return the unit vector of the boresight of an antenna at that position.
 
         An antenna without an aim (isotropic, or the base station's) looks along the base
         station's boresight.

@@ -1,7 +1,7 @@
-"""What cannot be is refused, before any work.
+"""Consistency checks of a scenario, made before anything is simulated.
 
-Arrays inside walls, solids inside one another, missing files, more facets than memory holds: each
-problem names the key, the value, the limit and the remedy.
+They find arrays inside walls, overlapping solids, missing files, and more facets than memory
+holds. Each message names the key, the value, the limit and the remedy.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What exists in two dimensions only, or in three only."""
+"""Checks for settings that are possible in 2-D scenes only, or in 3-D scenes only."""
 
 from collections.abc import Mapping
 
@@ -22,7 +22,7 @@ def dimension_problems(
     points: Mapping[str, PointTarget],
     objects: Mapping[str, SceneObject],
 ) -> list[str]:
-    """Find what two or three dimensions do not have.
+    """Find settings that do not exist in a scene of this number of dimensions.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def dimension_problems(
 
 
 def _polarization_problems(station: BaseStation, users: Mapping[str, User]) -> list[str]:
-    """In two dimensions radio.polarization is that of all antennas."""
+    """Find antennas with their own polarization in 2-D; radio.polarization holds for all."""
     found = []
     antennas = {"base_station.antenna": station.antenna}
     if station.transmitter is not None and station.transmitter.antenna is not None:

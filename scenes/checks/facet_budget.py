@@ -1,4 +1,4 @@
-"""How many facets a scenario needs, and what is refused as too many."""
+"""The number of facets that a scenario needs, and the check that they fit into memory."""
 
 import math
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ def facet_problems(
     *,
     flat: bool = False,
 ) -> list[str]:
-    """Find rough surfaces that cannot be, and facets that would not fit into memory.
+    """Find impossible roughness parameters, and objects whose facets do not fit into memory.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is wrong with the files that a scenario names: meshes, realisations, permittivities."""
+"""Checks of the files that a scenario names: meshes, realisations, permittivity tables."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,7 +30,7 @@ def file_problems(
     *,
     flat: bool,
 ) -> list[str]:
-    """Find files that are missing, unreadable, or do not fit what they are given for.
+    """Find files that are missing, unreadable, or inconsistent with the object that names them.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def file_problems(
 def _height_problems(
     name: str, body: Plate | Cylinder | Box | MeshFile, roughness: Roughness, *, flat: bool
 ) -> list[str]:
-    """Tell whether measured heights cover the object."""
+    """Find measured heights that do not fit the shape of an object, or are too few to cover it."""
     measured = roughness.measured
     if measured is None:
         return []
@@ -109,7 +109,7 @@ def _table_problems(name: str, path: Path, frequencies: Float[np.ndarray, " freq
 def _misplaced(
     name: str, body: Plate | Cylinder | Box | MeshFile, frozen: MeshFile, *, flat: bool
 ) -> list[str]:
-    """Compare the extents of a realisation with those of the smooth object."""
+    """Find a realisation whose extents differ from the object's by more than its heights."""
     axes = 2 if flat else 3
     given = placed_mesh(frozen).bounds
     if isinstance(body, MeshFile):
@@ -123,7 +123,7 @@ def _misplaced(
     apart = float(np.abs(given - expected)[:, :axes].max())
     limit = ROUNDED + HIGHEST * (0.0 if body.roughness is None else body.roughness.rms)
     if isinstance(body, Cylinder):
-        # The file's lines round are chords: of an edge e, they lie up to e² / 8r inside.
+        # The file has chords for circles; a chord of length e lies up to e² / 8r inside its circle.
         limit += LONGEST_CHORD**2 / 8 * body.radius_m
     if apart <= limit:
         return []

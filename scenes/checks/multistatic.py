@@ -1,4 +1,4 @@
-"""What is wrong with antennas that stand by themselves."""
+"""Checks of multistatic base stations: separate receivers and transmitters, not an array."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 
 
 def antenna_places(station: BaseStation) -> dict[str, tuple[float, float, float]]:
-    """Name every point that antennas apart are given by [m]."""
+    """Return all points by which separate antennas are placed, by the key that gives each [m]."""
     receivers, transmitter = station.receivers, station.transmitter
     points: dict[str, tuple[float, float, float]] = {}
     if isinstance(receivers, Arc):
@@ -37,12 +37,12 @@ def multistatic_problems(
     users: Sequence[str],
     clearance: float,
 ) -> list[str]:
-    """Find antennas apart that stand on objects, and users that nobody would locate.
+    """Find separate antennas on or in objects, and users, whose pilots are not received.
 
     Parameters
     ----------
     station
-        The base station; an array that hears its own echo has no such problems.
+        The base station; for a monostatic array nothing is checked.
     objects
         By name.
     users

@@ -1,4 +1,4 @@
-"""What stands where: arrays inside walls, users inside boxes, solids inside one another.
+"""Checks of positions: arrays inside walls, users inside boxes, solids that overlap.
 
 Plates, cylinders and boxes stand upright and are convex, so the signed distance to each is
 exact and convex, and so is its least value along a row of elements.
@@ -29,7 +29,7 @@ def inconsistencies(
     users: Mapping[str, Float[np.ndarray, " 3"]],
     clearance: float,
 ) -> list[str]:
-    """Find what cannot stand where it stands.
+    """Find overlapping solids, and antennas inside objects or too close to them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Point targets: what they need, and how near they may be."""
+"""Checks of point targets: spherical waves, and a minimum distance from antennas."""
 
 from collections.abc import Mapping
 

@@ -21,7 +21,7 @@ _BEGIN = {
     "objects": "kind",
     "users": "position_m",
     "points": "position_m",
-}  # what a new table cannot do without
+}  # required key of a new table
 
 _OVERRIDE = "override "
 
@@ -121,7 +121,7 @@ def load_scenario(
 
 
 def scenario_source(name_or_path: str) -> ScenarioSource:
-    """Read a scenario's tables, as :func:`load_scenario` does, and check nothing yet.
+    """Read a scenario's tables, as :func:`load_scenario` does, without validating them.
 
     Raises
     ------
@@ -165,8 +165,8 @@ def set_keys(data: dict[str, Any], values: Mapping[str, object], *, by: str = "-
     Raises
     ------
     ScenarioError
-        If a key leads through a value, or begins an object, a user or a point without what it
-        cannot do without.
+        If a key treats a value as a table, or creates an object, a user or a point without its
+        required key.
     """
     known = {group: set(_group(data, group)) for group in _BEGIN}
     for key, value in values.items():
@@ -224,7 +224,7 @@ def _override(data: dict[str, Any], overrides: Sequence[str]) -> None:
 
 
 def _as_read(value: object) -> object:
-    """Turn a value of Python's or NumPy's into what reading a TOML file would give."""
+    """Convert a Python or NumPy value to the type that a TOML file would give."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     return list(value) if isinstance(value, tuple) else value
@@ -262,7 +262,7 @@ def _set(key: str, value: object, data: dict[str, Any], *, shown_as: str) -> Non
 
 
 def _literal(text: str) -> object:
-    """Read a TOML literal; what is none is a string."""
+    """Read a TOML literal; any other text is returned as a string."""
     try:
         values = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):  # a ValueError: more digits than Python reads
@@ -293,8 +293,8 @@ def _resolve_files(data: dict[str, Any], folder: Path) -> None:
 def _absolute(folder: Path, name: str) -> str:
     try:
         return str((folder / name).resolve())
-    except (OSError, RuntimeError, ValueError):  # no file can be called so, or links in a circle
-        return str(folder / name)  # whoever opens it says so
+    except (OSError, RuntimeError, ValueError):  # not a valid file name, or circular links
+        return str(folder / name)  # the error is reported when the file is opened
 
 
 def _is_position(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""TOML files, read within limits: whatever somebody names, the answer is a table or a message."""
+"""Reading of TOML files within a size limit; any failure is reported as a ScenarioError."""
 
 import tomllib
 from importlib.resources.abc import Traversable
@@ -12,7 +12,7 @@ LARGEST_FILE = 10 * 2**20
 
 
 def is_file(path: Path) -> bool:
-    """Tell whether a file has that name; no file has one that no file system takes."""
+    """Tell whether a file exists; False for names that the file system does not allow."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -36,7 +36,7 @@ def read_toml(source: Traversable, *, name: str, kind: str, remedy: str) -> dict
     Raises
     ------
     ScenarioError
-        If it cannot be read, is too large, or no TOML.
+        If it cannot be read, is too large, or is not valid TOML.
     """
     name = shown_text(name)
     try:

@@ -18,7 +18,7 @@ _THE_FILES = ("kind", "file", "matrix", "facets")  # keys of an object that the 
 
 
 class Geometry(Checked):
-    """A foreign scene's meshes; its materials and shapes are given what they are made of."""
+    """The table [geometry]: a scene file of another program, and the materials of its shapes."""
 
     file: str | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""Triangle meshes from files, checked and put in their place."""
+"""Triangle meshes from files: checked, scaled, rotated and moved into the world frame."""
 
 import functools
 from pathlib import Path
@@ -122,7 +122,7 @@ def mesh_distance(
 def mesh_contains(
     body: MeshFile, points: Float[np.ndarray, "points 3"], *, deeper_than: float
 ) -> Bool[np.ndarray, " points"]:
-    """Tell which points lie inside a watertight mesh, and not just below its surface."""
+    """Tell which points lie inside a watertight mesh, deeper than ``deeper_than`` [m]."""
     if not _inside(body, points).any():
         return np.zeros(len(points), dtype=bool)
     return mesh_distance(body, points, farthest=2 * deeper_than) < -deeper_than

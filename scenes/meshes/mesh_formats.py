@@ -1,7 +1,7 @@
-"""Mesh files as triangles: PLY, STL, OBJ and OFF, from memory, and nothing that they refer to.
+"""Mesh files as triangles: PLY, STL, OBJ and OFF, parsed from memory; no other file is opened.
 
-The readers are our own: a library for all formats takes a second to import, and a scenario
-that cannot be is to be refused sooner.
+The readers are our own: a library for all formats takes a second to import, which would delay
+every error message about a scenario.
 """
 
 import re
@@ -37,7 +37,7 @@ def read_mesh(
     Raises
     ------
     ValueError
-        If the file is not what it should be.
+        If the content is damaged or not of this format.
     """
     polygons = READERS[kind](content)
     return polygons.vertices, triangles_of(polygons)

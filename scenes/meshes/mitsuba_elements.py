@@ -26,7 +26,7 @@ def parsed_scene(path: Path) -> ElementTree.Element:
     Raises
     ------
     ScenarioError
-        If it is no such file.
+        If the file is too large, cannot be read, or is not such XML.
     """
     try:
         size = path.stat().st_size

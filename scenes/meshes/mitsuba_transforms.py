@@ -1,4 +1,4 @@
-"""Transforms of a Mitsuba XML file: steps of which each acts after those above it."""
+"""Transforms of a Mitsuba XML file: a sequence of steps, applied from top to bottom."""
 
 import math
 from pathlib import Path
@@ -14,7 +14,7 @@ STEPS = ("matrix", "translate", "scale", "rotate", "lookat")
 
 
 def transform(path: Path, element: ElementTree.Element) -> Float[np.ndarray, "4 4"]:
-    """Multiply the steps of a transform; each acts after those above it."""
+    """Return the 4 x 4 matrix of a transform, its steps applied from top to bottom."""
     whole = np.eye(4)
     for step in element:
         match step.tag:
@@ -40,7 +40,7 @@ def transform(path: Path, element: ElementTree.Element) -> Float[np.ndarray, "4 
 
 def _matrix(path: Path, step: ElementTree.Element) -> Float[np.ndarray, "4 4"]:
     matrix = np.eye(4)
-    if sum(1 for _ in split_numbers(step.get("value", ""))) == 9:  # linear: nothing is moved
+    if sum(1 for _ in split_numbers(step.get("value", ""))) == 9:  # 3 x 3: no translation
         matrix[:3, :3] = np.array(numbers(path, step, "value", 9)).reshape(3, 3)
         return matrix
     matrix[:] = np.array(numbers(path, step, "value", 16)).reshape(4, 4)

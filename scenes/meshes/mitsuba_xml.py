@@ -1,8 +1,8 @@
-"""Foreign scenes: which meshes and materials a Mitsuba or Sionna XML file puts where.
+"""Scenes of other programs: shapes, poses and materials from a Mitsuba or Sionna XML file.
 
-The file is taken for untrusted. It is parsed here and never handed to a renderer, so that no
-plugin of it runs; it may name PLY and OBJ files in its own folder, and no others. Cameras,
-lights and integrators are left alone.
+The file is treated as untrusted. It is parsed here and never given to a renderer, so that it
+cannot load plugins; it may name PLY and OBJ files in its own folder, and no others. Cameras,
+lights and integrators are ignored.
 """
 
 import re
@@ -66,7 +66,7 @@ RADIO_DEFAULTS = {"relative_permittivity": 1.0, "conductivity": 0.0, "thickness"
 _SNAKE_CASE = (2, 0, 0)  # version of a scene from which Mitsuba calls 'toWorld' to_world
 _TOP = ("shape", "bsdf", "default", "sensor", "emitter", "integrator", "texture", "path")
 _PARAMETERS = ("boolean", "integer", "float", "string", "rgb", "spectrum", "ref", "transform")
-_LIT = ("emitter", "interior", "exterior", "texture")  # of no matter to radio waves
+_LIT = ("emitter", "interior", "exterior", "texture")  # without effect on radio waves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class RadioSlab:
 
 @dataclass(frozen=True, kw_only=True)
 class ForeignMaterial:
-    """A material of a foreign scene, as far as it can be told."""
+    """A material of a foreign scene, as far as the file specifies it."""
 
     name: str  # as in the file, without 'mat-' in front; dots and the like are underscores
     itu_type: str | None = None  # name of an ITU-R P.2040 material, if it is one

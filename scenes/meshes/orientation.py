@@ -1,4 +1,4 @@
-"""Which side of a mesh is outside: each closed part of it for itself, cavities among them.
+"""Consistent outward orientation of a mesh, for each connected part, cavities included.
 
 Files hold several bodies in one mesh, some inside out, some with single triangles turned. The
 triangles of each connected part are first wound alike along shared edges, then, where the part is
@@ -23,8 +23,8 @@ def oriented(mesh: TriangleMesh) -> TriangleMesh:
     Parameters
     ----------
     mesh
-        Its triangles may be wound anyhow. Parts hang together over edges that exactly two
-        triangles share.
+        Its triangles may have any winding. A connected part consists of triangles joined by
+        edges that exactly two triangles share.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def _wound_alike(
     pairs: Int[np.ndarray, "pairs 2"],
     against: Bool[np.ndarray, " pairs"],
 ) -> Bool[np.ndarray, " faces"]:
-    """Walk over each part from its first triangle; turn what runs against the one before."""
+    """Tell which triangles to reverse, so that each part is wound like its first triangle."""
     turned = np.zeros(len(part), dtype=bool)
     disagree = {tuple(pair) for pair in np.sort(pairs[against], axis=1).tolist()}
     affected = np.unique(part[pairs[against, 0]])
@@ -76,7 +76,7 @@ def _wound_alike(
 def _closed(
     mesh: TriangleMesh, part: Int[np.ndarray, " faces"], parts: int
 ) -> Bool[np.ndarray, " parts"]:
-    """Tell which parts have three neighbours at each triangle."""
+    """Tell which parts are closed: each triangle has three neighbours."""
     neighbours = np.bincount(mesh.neighbours.ravel(), minlength=len(part))
     open_faces = np.bincount(part, weights=neighbours != 3, minlength=parts)
     return np.asarray(open_faces == 0)

@@ -35,7 +35,7 @@ def read_ply(content: bytes) -> Polygons:
     Raises
     ------
     ValueError
-        If it is none, or is truncated.
+        If it is not a PLY file, or is truncated.
     """
     end = re.search(rb"\bend_header[ \t]*\r?\n", content)
     if not content.startswith(b"ply") or end is None:
@@ -158,7 +158,7 @@ def _binary(
 def _alike(
     body: memoryview, at: int, element: _Element, order: str
 ) -> tuple[np.ndarray | None, int]:
-    """Read rows at once whose lists are as long as those of the first row; None if they are not."""
+    """Read all rows at once if every list is as long as that of the first row; else return None."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     end = at
     for name, kind in element.columns.items():

@@ -21,7 +21,7 @@ def triangles_of(polygons: Polygons) -> Int[np.ndarray, "faces 3"]:
     Raises
     ------
     ValueError
-        If a polygon has a vertex that there is not.
+        If a polygon refers to a vertex that does not exist.
     """
     corners, counts, known = polygons.corners, polygons.counts, len(polygons.vertices)
     wrong = (corners < 0) | (corners >= known)

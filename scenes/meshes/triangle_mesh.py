@@ -61,7 +61,7 @@ class TriangleMesh:
 
     @cached_property
     def open_edges(self) -> int:
-        """How many edges belong to one triangle, or to more than two."""
+        """Number of edges that belong to one triangle, or to more than two."""
         _, counts, _ = self._edges
         return int(np.count_nonzero(counts != 2))
 
@@ -73,7 +73,7 @@ class TriangleMesh:
 
     @cached_property
     def against(self) -> Bool[np.ndarray, " pairs"]:
-        """Which neighbours run along the edge they share in the same way: one is turned."""
+        """Whether each pair of neighbours is wound oppositely: both run along their edge alike."""
         order, counts, forward = self._edges
         pairs = _pairs(order, counts)
         return np.asarray(forward[pairs[:, 0]] == forward[pairs[:, 1]])
@@ -111,7 +111,7 @@ def _pairs(
 def cleaned(
     vertices: Float[np.ndarray, "vertices 3"], faces: Int[np.ndarray, "faces 3"]
 ) -> TriangleMesh:
-    """Join vertices in one place, drop triangles without a height, and vertices without one.
+    """Merge coincident vertices; drop degenerate triangles, and vertices that no triangle uses.
 
     The order of what stays is kept.
     """

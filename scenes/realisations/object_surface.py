@@ -1,8 +1,8 @@
 """Surfaces of a scenario's objects, cut into facets and displaced by frozen roughness.
 
 Line cells (2-D scenes) run so that the normal of a cell from v0 to v1, with (dx, dy) = v1 - v0,
-is (dy, -dx)/|v1 - v0|: to the right of the way. Closed contours run counter-clockwise, so this
-is outward; on a plate it is the plate's ``normal``. Triangles (3-D scenes) are wound
+is (dy, -dx)/|v1 - v0|: to the right, seen along the cell. Closed contours run counter-clockwise,
+so this is outward; on a plate it is the plate's ``normal``. Triangles (3-D scenes) are wound
 counter-clockwise as seen from outside, or from the side of the plate's ``normal``.
 
 How heights displace the mean shape: along the normal of a plate; radially on a cylinder, with
@@ -41,7 +41,7 @@ class Surface:
     closed: bool  # closed: only the outer side is seen; open: both sides
     screens: Int[np.ndarray, "screens 3"] = field(
         default_factory=lambda: np.empty((0, 3), dtype=np.int64)
-    )  # triangles where nobody looks: they only block rays
+    )  # triangles outside all antenna beams: they only block rays
     roughness: Roughness | None = None  # statistics of the heights; None: none are known
 
 

@@ -1,4 +1,4 @@
-"""A rough plate in tiles: where the facets of the whole would not fit into memory at once."""
+"""A rough plate in tiles, for plates whose facets do not fit into memory at once."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

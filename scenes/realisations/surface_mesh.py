@@ -7,7 +7,7 @@ from scenes.realisations.object_surface import Surface
 
 
 def surface_to_mesh(surface: Surface, *, extrude: float | None) -> trimesh.Trimesh:
-    """Make a triangle mesh of a surface as it is displaced.
+    """Return a triangle mesh of a surface, displaced by its roughness.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Distributions over a scenario's keys, and the samples drawn from them.
 
-Sample n depends on the seed and n alone, and every key has a stream of its own. Impossible draws
-are drawn again.
+Sample n depends only on the seed and n, and every key has its own random stream. Draws that give
+an impossible scene are repeated.
 """
 
 import lazy_loader

@@ -35,7 +35,7 @@ a thousand times on average at most. [-]"""
 
 
 class Uniform(Checked):
-    """Any number of a range, all alike."""
+    """Uniform distribution of real numbers over a range."""
 
     kind: Literal["uniform"]
     low: Number = Field(description="the smallest value")
@@ -56,7 +56,7 @@ class Uniform(Checked):
 
 
 class UniformInteger(Checked):
-    """Any whole number of a range, its ends included, all alike."""
+    """Uniform distribution of integers over a range, its ends included."""
 
     kind: Literal["uniform_integer"]
     low: int = Field(ge=-(2**53), le=2**53, description="the smallest value")
@@ -77,7 +77,7 @@ class UniformInteger(Checked):
 
 
 class LogUniform(Checked):
-    """Any number of a range, its logarithm uniform: each octave as likely as any other."""
+    """Log-uniform distribution over a range: each octave is equally likely."""
 
     kind: Literal["log_uniform"]
     low: Annotated[float, Field(gt=0, le=1e12)] = Field(description="the smallest value, above 0")
@@ -99,7 +99,7 @@ class LogUniform(Checked):
 
 
 class Normal(Checked):
-    """A Gaussian, cut off where ``low`` and ``high`` say so."""
+    """Normal distribution, truncated at ``low`` and ``high`` where they are given."""
 
     kind: Literal["normal"]
     mean: Number = Field(description="the mean before it is cut off")
@@ -117,7 +117,7 @@ class Normal(Checked):
             raise PydanticCustomError(
                 "range", "low = {low} must be below high = {high}", {"low": low, "high": high}
             )
-        # Looked at on a fine grid of ±8 deviations: whether draws take for ever, no more.
+        # Probability within the limits, on a fine grid of ±8 deviations: rejection must end soon.
         steps = np.linspace(-8.0, 8.0, 16_001)
         density = np.exp(-0.5 * steps**2)
         kept = (self.mean + self.deviation * steps >= low) & (
@@ -149,7 +149,7 @@ class Normal(Checked):
 
 
 class Choice(Checked):
-    """One of a few values, alike or weighted."""
+    """Discrete distribution: one of a few values, equally likely or weighted."""
 
     kind: Literal["choice"]
     values: Values = Field(description="the values to choose from")
@@ -172,7 +172,7 @@ class Choice(Checked):
     def draw(self, rng: np.random.Generator) -> object:
         """Draw a value."""
         weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
-        # By hand: the random number behind Generator.choice is not promised to stay.
+        # Not by Generator.choice: NumPy may change how it uses the random stream.
         place = np.searchsorted(np.cumsum(weights) / weights.sum(), rng.random(), side="right")
         return self.values[min(int(place), len(self.values) - 1)]
 
@@ -182,7 +182,7 @@ class Choice(Checked):
 
 
 class Grid(Checked):
-    """Values of which every combination with those of the other grids is gone through."""
+    """Values of one axis of a full grid: every combination with the other grids is used."""
 
     kind: Literal["grid"]
     values: Values = Field(description="the values to go through")
@@ -193,7 +193,7 @@ class Grid(Checked):
 
 
 class Listed(Checked):
-    """Values gone through side by side with those of the other lists."""
+    """Values used in step with those of the other lists: the first with the first, and so on."""
 
     kind: Literal["list"]
     values: Values = Field(description="the values to go through, beside the other lists'")
@@ -204,7 +204,7 @@ class Listed(Checked):
 
 
 class InBox(Checked):
-    """A position in a box along the axes, all places alike."""
+    """A position, uniformly distributed in an axis-aligned box."""
 
     kind: Literal["in_box"]
     low_m: Position = Field(description="the corner of the smallest coordinates [m]")
@@ -230,7 +230,7 @@ class InBox(Checked):
 
 
 class InPolygon(Checked):
-    """A position in a polygon of the plan, all places alike, and between two heights."""
+    """A position, uniformly distributed over a polygon in the xy plane and between two heights."""
 
     kind: Literal["in_polygon"]
     corners_m: Annotated[
@@ -246,7 +246,7 @@ class InPolygon(Checked):
         corners = self._plan
         size = np.ptp(corners, axis=0).prod()
         # Of a random point of the box around it, at least one in a thousand must be inside.
-        # Its area does not tell if it crosses itself: gone round twice, it has no inside.
+        # The area alone does not tell: a self-crossing outline, run twice, has no interior.
         few = np.random.default_rng(0).uniform(
             corners.min(axis=0), corners.max(axis=0), size=(_PROBES, 2)
         )

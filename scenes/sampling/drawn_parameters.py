@@ -1,4 +1,4 @@
-"""How the keys that vary from sample to sample are stored: as what, and in which unit."""
+"""How the keys that vary from sample to sample are stored: their data type and unit."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""The samples of varied scenarios: sample n depends on (seed, n) alone, whoever draws it.
+"""The samples of varied scenarios: sample n depends on (seed, n) alone, not on the process.
 
 Every key has a random stream of its own, so that varying one more key does not redraw the
 others. Where what was drawn is impossible (a user inside a wall, solids that overlap), all keys
@@ -45,13 +45,13 @@ class Attempt:
 
 @dataclass(frozen=True)
 class SampleSpace:
-    """A base scenario and what varies about it."""
+    """A base scenario and the distributions of the keys that vary."""
 
     source: ScenarioSource
     variations: Variations
 
     def attempts(self, sample: int) -> Iterator[Attempt]:
-        """Draw a sample, again and again, as often as the variations allow.
+        """Yield draws of one sample, up to the number of attempts that the variations allow.
 
         Parameters
         ----------
@@ -62,7 +62,7 @@ class SampleSpace:
         streams: dict[str, np.random.Generator] = {}
 
         def stream(name: str) -> np.random.Generator:
-            # Kept between attempts: each goes on where the one before ended.
+            # Kept between attempts: each attempt continues the streams of the one before.
             if name not in streams:
                 streams[name] = random_stream(seed, sample, name)
             return streams[name]
@@ -114,7 +114,7 @@ class SampleSpace:
         return self.source.changed(change)
 
     def check(self) -> Attempt:
-        """Check every key against what a scenario takes, at the ends of its distribution.
+        """Check that every key exists, and that the ends of its distribution are allowed values.
 
         Returns
         -------
@@ -220,7 +220,7 @@ class SampleSpace:
 
     @cached_property
     def _some_tables(self) -> dict[str, Any]:
-        """Tables of a possible sample, geometry and all brought in."""
+        """Return the tables of the first possible sample, imported geometry included."""
         tables = self.tables(next(self.attempts(0)).values)
         return dict(with_geometry(tables))
 
@@ -286,7 +286,7 @@ class SampleSpace:
         return steps
 
     def _put(self, tables: dict[str, Any], values: Mapping[str, object]) -> None:
-        """Put the copies in their template's place, and take out what does not exist."""
+        """Replace each template by its copies, and remove the tables that this sample lacks."""
         for name, number in self.variations.number.items():
             for path in number.among or ():
                 if values.get(f"number.{name}.without.{path}"):

@@ -20,7 +20,7 @@ MOST_SAMPLES = 100_000_000
 """Most samples of a dataset."""
 
 MOST_ATTEMPTS = 10_000
-"""Most draws of one sample: rarer than one in so many, what varies is to be narrowed."""
+"""Most draws of one sample; if possible scenes are rarer, the distributions must be narrowed."""
 
 MOST_COPIES = 1000
 """Most copies of one template."""
@@ -59,7 +59,7 @@ Settings = Annotated[dict[str, Any], BeforeValidator(_settings)]
 
 
 class Number(Checked):
-    """How many of something there are: copies of one table, or some among several."""
+    """A varying number of objects, points or users: copies of one table, or a subset of several."""
 
     of: str | None = Field(
         None, description="the table that is copied, such as 'objects.post'; or give among"

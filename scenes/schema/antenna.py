@@ -24,7 +24,7 @@ def _polarization(value: object) -> object:
 
 
 class Polarized(Checked):
-    """What sends and receives one linear polarization."""
+    """An antenna of one linear polarization."""
 
     polarization: Annotated[
         Literal["vertical", "horizontal"] | float, BeforeValidator(_polarization)
@@ -56,7 +56,7 @@ class Isotropic(Polarized):
 
 
 class Directive(Polarized):
-    """What looks somewhere: at an object, at a point, or along an azimuth."""
+    """An antenna with a boresight: towards an object or a point, or along an azimuth."""
 
     aim: Name | None = Field(None, description="the object at whose centre the antenna looks")
     aim_m: Position | None = Field(None, description="the point at which the antenna looks [m]")

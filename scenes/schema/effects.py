@@ -1,4 +1,4 @@
-"""Which effects of propagation are simulated, one by one; a switch for each."""
+"""Switches for the propagation effects that are simulated."""
 
 from pydantic import Field
 

@@ -1,4 +1,4 @@
-"""What is wrong with a scenario, said so that it can be mended: key, value, limit, remedy."""
+"""Error messages about a scenario, each with key, value, limit and remedy."""
 
 import difflib
 import reprlib
@@ -20,12 +20,12 @@ _SHORT.maxdict = _SHORT.maxlist = _SHORT.maxtuple = 4
 
 
 class ScenarioError(ValueError):
-    """A scenario cannot be: one line per problem, each with key, value, limit and remedy."""
+    """A scenario is invalid: one line per problem, each with key, value, limit and remedy."""
 
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     """Suggest the closest known word: ``" (did you mean 'wall'?)"``, or nothing."""
-    if len(wrong) > _LONGEST_TEXT:  # comparing takes the square of it
+    if len(wrong) > _LONGEST_TEXT:  # the comparison takes time in proportion to its square
         return ""
     close = difflib.get_close_matches(wrong, list(known), n=1, cutoff=0.6)
     return f" (did you mean {close[0]!r}?)" if close else ""
@@ -60,8 +60,8 @@ def problems(
     model
         The model that was read; its field descriptions serve as remedies.
     of_keys_only
-        Leave out what is wrong between keys that are right each for itself: what stands in the
-        way of what.
+        Report single keys only, not conflicts between keys that are each valid, such as objects
+        that overlap.
     """
     lines: list[str] = []
     for finding in error.errors(include_url=False):

@@ -25,7 +25,7 @@ EVEN = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Heights over a mean plane, which has been taken out."""
+    """Heights of a surface over its mean plane, which has been subtracted."""
 
     heights: Float[np.ndarray, "first second"]  # a profile's second direction has length 1 [m]
     step: float  # between neighbours, in both directions [m]
@@ -55,7 +55,7 @@ class HeightMap:
         return float(self.step * (last - 1 + (high - 1 / np.e) / (high - low)))
 
     def slope_share(self, width: float) -> float:
-        """Share of the slopes' variance that a Gaussian of a standard width leaves. [-]."""
+        """Share of slope variance left after smoothing by a Gaussian of that width [m]. [-]."""
         first, second = (
             2 * np.pi * np.fft.fftfreq(count, self.step) for count in self.heights.shape
         )
@@ -206,7 +206,7 @@ def _tiff(path: Path) -> np.ndarray:
 
 
 def _levelled(heights: np.ndarray) -> np.ndarray:
-    """Take the plane out that fits best."""
+    """Subtract the least-squares plane from the heights [m]."""
     first, second = (np.arange(n) - (n - 1) / 2 for n in heights.shape)
     level = heights - heights.mean()
     for along, axis in ((first[:, None], 0), (second[None, :], 1)):

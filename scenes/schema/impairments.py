@@ -1,4 +1,4 @@
-"""What a real radio does to its samples, beyond thermal noise; each is off unless given."""
+"""Hardware impairments of the radio, beyond thermal noise; each is off unless given."""
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError

@@ -1,7 +1,7 @@
-"""What objects are made of: named materials, and slabs of a permittivity that a scenario gives.
+"""Materials of objects: named materials, and slabs of a permittivity that a scenario gives.
 
-Only names and numbers: what they reflect is the simulator's matter
-(``simulator.materials.fresnel_slab``), and a test holds the names of both together.
+Only names and numbers: the simulator computes the reflection coefficients
+(``simulator.materials.fresnel_slab``), and a test checks that both know the same names.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Antennas that stand by themselves: receivers on an arc or anywhere, and their transmitters.
+"""Multistatic antennas: separate receivers, on an arc or anywhere, and their transmitters.
 
 What a bistatic measurement is made of. The arms of a bench that carry its horns are not part
 of the scene, nor is what leaks from one horn to the other: a measured sweep is calibrated for it.

@@ -15,7 +15,7 @@ FLOOR = ("figure_db", "bandwidth_hz", "transmit_power_dbm")
 
 
 class Noise(Checked):
-    """Thermal noise: relative to the signal, or a floor of its own that far users sink into."""
+    """Thermal noise: by its ratio to the signal, or by an absolute noise floor kTBF."""
 
     snr_db: float = Field(
         float("inf"), ge=-60, allow_inf_nan=True, description="the signal-to-noise ratio [dB]"
@@ -54,7 +54,7 @@ class Noise(Checked):
 
     @property
     def floor(self) -> float | None:
-        """Variance of the noise over the power sent, kTBF/P; None: it goes with the signal. [-]."""
+        """Noise variance over transmit power, kTBF/P; None: relative to the signal. [-]."""
         if self.figure_db is None or self.bandwidth_hz is None or self.transmit_power_dbm is None:
             return None
         sent = 1e-3 * 10 ** (self.transmit_power_dbm / 10)

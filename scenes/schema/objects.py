@@ -174,14 +174,14 @@ SceneObject = Annotated[Plate | Cylinder | Box | MeshFile, Field(discriminator="
 
 
 def smallest_size(body: Plate | Cylinder | Box) -> float:
-    """Return the smallest extent that a rough surface must leave standing [m]."""
+    """Return the smallest extent of an object, which limits its rms height [m]."""
     return min(_sizes(body))
 
 
 def largest_size(body: Plate | Cylinder | Box) -> float:
     """Return the largest extent over which heights can be correlated [m].
 
-    Around a cylinder that is its radius: heights on opposite sides must not know each other.
+    Around a cylinder that is its radius: heights on opposite sides must be uncorrelated.
     """
     return body.radius_m if isinstance(body, Cylinder) else max(_sizes(body))
 

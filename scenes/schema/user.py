@@ -1,4 +1,4 @@
-"""Users: transmitters whose position is asked for."""
+"""Users: transmitters whose position is to be estimated."""
 
 import numpy as np
 from jaxtyping import Float

@@ -24,7 +24,7 @@ FEWEST_ROUND = 64
 
 
 def facet_spacing(body: Body, shortest_wavelength: float) -> float:
-    """Return the largest spacing of the vertices that keeps physical optics true [m].
+    """Return the largest spacing of vertices at which facet sums of physical optics converge [m].
 
     It is min(λ/4, l/4), with half the inner cut-off as a third limit for an exponential
     spectrum. An absorber scatters nothing and needs no facets: infinity.

@@ -1,4 +1,4 @@
-r"""Heights that are not Gaussian: a Gaussian surface seen through a rising function.
+r"""Heights that are not Gaussian: a monotonic transform of a Gaussian surface.
 
 With the standard Gaussian height g, uniform heights are :math:`\sqrt{12}\,(\Phi(g) - \tfrac12)`
 and lognormal ones :math:`(e^{bg} - e^{b^2/2}) / \sqrt{e^{b^2}(e^{b^2} - 1)}`, whose skewness is
@@ -47,7 +47,7 @@ def transformed(
 
 
 def lognormal_width(skewness: float) -> float:
-    r"""Find b of a skewness: :math:`x = e^{b^2}` solves :math:`x^3 + 3 x^2 = 4 + s^2`. [-]."""
-    # By y = x + 1: y³ - 3y = 2 + s², of which cosh gives the one real root.
+    r"""Return b for a skewness s: :math:`x = e^{b^2}` solves :math:`x^3 + 3 x^2 = 4 + s^2`. [-]."""
+    # With y = x + 1: y³ - 3y = 2 + s²; its one real root is 2 cosh(arcosh(1 + s²/2) / 3).
     root = 2.0 * math.cosh(math.acosh(1.0 + 0.5 * skewness**2) / 3.0)
     return math.sqrt(math.log(root - 1.0))

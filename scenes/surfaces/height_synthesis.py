@@ -75,7 +75,7 @@ def rough_profile(
         The stream of this surface.
     periodic
         Whether the line closes on itself (a circumference); else it is cut from a period so
-        much longer that its two ends know nothing of each other.
+        much longer that the heights at its two ends are uncorrelated.
 
     Returns
     -------
@@ -169,7 +169,8 @@ def slope_share(roughness: Roughness | None, width: float) -> float:
 
     Returns
     -------
-    1 for a surface much longer in its waves than the width, 0 for a much shorter one. [-]
+    The share g: 1 if the correlation length is much longer than the width, 0 if it is much
+    shorter. [-]
     """
     if roughness is None or roughness.rms == 0 or width == 0:
         return 1.0
@@ -215,7 +216,7 @@ class _Axis:
                 f"the length must be positive, and at least {fewest} heights are needed"
             )
         # Cut from a period that is a whole multiple of the length, so that equal steps fit
-        # into it, and long enough for the two ends not to meet across its seam.
+        # into it, and long enough that the two ends are uncorrelated across the periodic boundary.
         seam = _REACH[spectrum] * correlation_length
         periods = 1 if periodic else max(2, 1 + math.ceil(seam / length))
         steps = count if periodic else periods * (count - 1)

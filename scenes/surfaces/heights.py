@@ -17,7 +17,7 @@ are interpolated: cubic splines through them are within 1e-3 of the rms height. 
 
 
 class Statistics(TypedDict):
-    """What is asked of :func:`scenes.surfaces.height_synthesis.rough_profile`."""
+    """Keyword arguments of :func:`scenes.surfaces.height_synthesis.rough_profile`."""
 
     rms: float
     correlation_length: float
@@ -109,7 +109,7 @@ class Heights:
 
         detail = min(one["inner_cutoff"] or one["correlation_length"] for one in self.drawn)
         step = detail / SAMPLES_PER_DETAIL
-        # A margin around the places, where the spline knows the heights on one side only.
+        # A margin around the places: at its border a spline is less accurate.
         low = low - detail
         extent = places.max(axis=0) + detail - low
         first, second = (int(np.ceil(side / step)) + 1 for side in extent)

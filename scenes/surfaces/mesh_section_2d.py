@@ -56,7 +56,7 @@ def lines_are_closed(cells: Int[np.ndarray, "cells 2"]) -> bool:
 def mesh_segments(
     body: MeshFile,
 ) -> tuple[Float[np.ndarray, "lines 3"], Float[np.ndarray, "lines 3"]]:
-    """Find the lines in which a mesh meets z = 0; its outer side is to the right of their way.
+    """Find the lines in which a mesh meets z = 0; its outer side is to their right.
 
     Raises
     ------

@@ -69,7 +69,7 @@ def shape_in_reach(
 
 
 def in_reach(shape: Shape, reach: Reach) -> Shape:
-    """Leave only the facets in reach to scatter."""
+    """Keep as scattering facets only those in reach; the others only block rays."""
     corners = shape.mean_vertices[shape.cells]
     centres = corners.mean(axis=1)
     radius = float(np.linalg.norm(corners - centres[:, None], axis=-1).max(initial=0.0))

@@ -15,7 +15,7 @@ class Shape:
     cells: Int[np.ndarray, "cells corners"]  # outward, or to the side of the plate's normal
     screens: Int[np.ndarray, "screens 3"] = field(
         default_factory=lambda: np.empty((0, 3), dtype=np.int64)
-    )  # triangles where nobody looks: they only block rays
+    )  # triangles outside all antenna beams: they only block rays
 
 
 def grid_triangles(

@@ -1,4 +1,4 @@
-"""Flat faces cut into facets only where somebody looks; the rest, in large cells, blocks rays."""
+"""Flat faces, cut into facets only inside antenna beams; large cells elsewhere only block rays."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Face:
 
 @dataclass(frozen=True, kw_only=True)
 class TiledFace:
-    """Vertices of a face, its facets, and the large triangles of what nobody looks at."""
+    """Vertices of a face, its facets, and the large triangles outside all antenna beams."""
 
     vertices: Float[np.ndarray, "vertices 3"]  # [m]
     mean_vertices: Float[np.ndarray, "vertices 3"]  # [m]
