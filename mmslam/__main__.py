@@ -1,4 +1,4 @@
-"""``python -m mmslam``, for where the command is not on the path."""
+"""Entry point of ``python -m mmslam``, for when the command is not on the PATH."""
 
 from mmslam.cli import app
 

@@ -21,7 +21,7 @@ from mmslam.table import Table, html, text
 class Dataset:
     """The samples of a dataset, each a measurement with its truth beside it.
 
-    Nothing is held but the path: a sample is read when it is asked for.
+    Samples are read from the file when they are accessed; none is kept in memory.
     """
 
     path: Path
@@ -58,7 +58,7 @@ class Dataset:
 
     @cached_property
     def parameters(self) -> xr.Dataset | None:
-        """What was drawn for each sample, by key; None where that is not known."""
+        """Drawn parameters of each sample, by key; None if the file does not hold them."""
         if not (self.path / PARAMETERS).exists():
             return None
         drawn: xr.Dataset = xr.open_zarr(

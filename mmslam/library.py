@@ -8,7 +8,7 @@ __all__ = ["Scenario", "load_scenario", "scenarios"]
 
 
 class Titles(dict[str, str]):
-    """What each scenario shows, in a line, by its name; it prints as a table."""
+    """One-line title of each scenario by its name; prints as a table."""
 
     def table(self) -> Table:
         """Return names and titles."""

@@ -1,6 +1,6 @@
-"""From a measurement to an answer, and to a folder of results.
+"""From a measurement to an estimate, and to a folder of results.
 
-Nothing here needs a scenario: what only locates loads neither its models nor the ray tracer.
+Nothing here needs a scenario, so ``locate`` loads neither its models nor the ray tracer.
 """
 
 import time
@@ -28,17 +28,17 @@ def locate(
     Parameters
     ----------
     measurement
-        Of a linear or a planar array; echo or uplinks may be missing. A truth beside it is taken
-        off first: the estimator is not given it.
+        Measurement of a linear or a planar array; echo or uplinks may be missing. Its ground truth,
+        if any, is not passed to the estimator.
     images
-        Whether images and close-ups can be asked for later, when they are formed; the answer itself
-        does not need them.
+        Whether images and enlarged maps are available in the estimate (formed on first access); the
+        estimate itself does not need them.
     progress
-        Told each stage.
+        Called after each stage.
 
     Returns
     -------
-    What was found, in the world frame. That nothing was found is an answer, too.
+    Users, mirrors and targets in the world frame [m]; each may be empty or *not found*.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def locate_measurement(
     folder
         As in :func:`run_scenario`; None: ``out/SCENARIO-SEED-located``.
     progress
-        Told each stage's steps.
+        Called with each stage's steps.
     """
     measurement = read(path, sample=sample)
     folder = folder or default_folder(measurement, path, sample)

@@ -1,4 +1,4 @@
-"""Measurement files made of somebody else's data, and somebody else's of ours."""
+"""Import of measured data into measurement files, and export to other formats."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,15 +28,15 @@ def import_measured(
     source
         The folder or file.
     mapping
-        Says what in it is what: a TOML file, or its tables. None: ``mapping.toml`` in the folder,
-        if there is one; else ``source`` is a full-wave reference (an .npz of `echo`,
+        Describes the data (variables, axes, units): a TOML file, or its tables. None:
+        ``mapping.toml`` in the folder, if there is one; else ``source`` is a full-wave reference (an .npz of `echo`,
         `aperture_position`, `frequency`, `uplink_…`), its truth included.
     uplink
         Which pilot of a full-wave reference; None: ``uplink_beam``, else the first.
 
     Returns
     -------
-    The measurement; its notes say what looked odd in the data.
+    The measurement; its notes name implausible data.
 
     Raises
     ------

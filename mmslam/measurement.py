@@ -1,7 +1,7 @@
-"""A measurement as the front door hands it out: with the truth beside it, where that is known.
+"""The measurement of the Python interface: data, and beside them the ground truth if known.
 
-The estimator's own data model has no room for a truth. :func:`mmslam.locate` takes the
-measurement proper out of the one here, and hands over nothing else.
+The estimator's own data model has no field for the truth: :func:`mmslam.locate` passes on only
+the data, by :meth:`Measurement.without_truth`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,12 +24,12 @@ from validation.metrics.truth import Truth, read_truth_dataset, truth_from_datas
 __all__ = ["Echo", "Measurement", "TruthFile", "Uplink"]
 
 USER = "user"
-"""What a single pilot's user is called where nobody gives a name."""
+"""Default name of the user of a single pilot."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TruthFile:
-    """Where the truth beside a stored measurement lies; opened when it is first asked for."""
+    """Reference to the truth in a measurement file; read on first access."""
 
     store: Path
     sample: int | None = None
@@ -66,7 +66,7 @@ class Measurement(model.Measurement):
     """
 
     beside: xr.Dataset | TruthFile | None = None  # the truth; the estimator is never given it
-    notes: tuple[str, ...] = ()  # what looked odd when it was read
+    notes: tuple[str, ...] = ()  # remarks on implausible data at import
 
     @classmethod
     def of(
@@ -149,7 +149,7 @@ class Measurement(model.Measurement):
         )
 
     def without_truth(self) -> model.Measurement:
-        """Return what the estimator may know: the measurement proper."""
+        """Return the data without the truth, as the estimator gets them."""
         return model.Measurement(**_parts(self))
 
     def to_xarray(self) -> xr.Dataset:
@@ -158,7 +158,7 @@ class Measurement(model.Measurement):
 
     @cached_property
     def truth_dataset(self) -> xr.Dataset | None:
-        """All that is known beside the measurement, its paths included; None: nothing is."""
+        """The ground truth as a dataset, with the true paths; None if it is unknown."""
         return self.beside.read() if isinstance(self.beside, TruthFile) else self.beside
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Users that move: the answers of successive measurements joined to one track for each."""
+"""Moving users: position estimates of successive measurements, joined to one track per user."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from estimator.tracking.multi_hypothesis import ACCELERATION, Track, fix, track
 
 @dataclass(frozen=True, kw_only=True)
 class MovingUser:
-    """One user's answers at all times, and the track through them."""
+    """One user's position estimates at all times, and the track through them."""
 
     name: str
     times: tuple[float, ...]  # [s]

@@ -1,4 +1,4 @@
-"""Where results go: written aside and exchanged at the end, so nothing is ever half-written.
+"""Atomic output: results are written to a temporary folder, which replaces the old one at the end.
 
 Beside ``NAME`` lies ``.NAME.mmslam`` while a command works::
 
@@ -7,8 +7,8 @@ Beside ``NAME`` lies ``.NAME.mmslam`` while a command works::
     whole-INODE     what is written, about to take its place; after the exchange, what it replaced
     replaced        the same, where two names cannot be exchanged in one step
 
-A command that is killed leaves that folder behind, and the next one on the same output puts back
-what was out of its place, whatever the moment.
+A killed command leaves that folder behind; the next one on the same output then restores the
+earlier result, at whatever step it was killed.
 """
 
 import errno
@@ -30,8 +30,8 @@ LONGEST_NAME = 255
 Refusal = Callable[[Path], str | None]
 """Says why a folder that is already there must not be replaced; None: it may be."""
 
-_SETTLING = 0.05  # how long late writers are given after each removal [s]
-_ABSENCES = 4  # how often the folder must then be found absent
+_SETTLING = 0.05  # waiting time after each removal for threads that still write [s]
+_ABSENCES = 4  # successive checks that must find the folder absent
 _MOST_REMOVALS = 40
 
 # What a full disk, a quota, a size limit, a read-only place or a missing right report.
@@ -52,15 +52,15 @@ _PLACE_ERRORS = {
 
 
 class OutputError(ValueError):
-    """A result cannot go where it was asked to; the message says why and what to do."""
+    """A result cannot be written to the place asked for; the message says why and what to do."""
 
 
 @contextmanager
 def replacing(target: Path, refusal: Refusal) -> Iterator[Path]:
-    """Give a path whose folder takes the place of ``target`` once the block has ended well.
+    """Yield the path of a new folder that replaces ``target`` if the block ends without an error.
 
-    If the block fails, is interrupted or killed, ``target`` is as it was; what is there at the
-    end is looked at again before it is replaced.
+    If the block fails, is interrupted or killed, ``target`` stays unchanged. At the end ``refusal``
+    is asked again before ``target`` is replaced.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def replacing(target: Path, refusal: Refusal) -> Iterator[Path]:
 
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
-    """Give a path whose file becomes ``target`` once the block has ended well.
+    """Yield the path of a new file that becomes ``target`` if the block ends without an error.
 
     Raises
     ------
@@ -110,20 +110,20 @@ def new_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def reserved(target: Path, refusal: Refusal = lambda found: None) -> Iterator[Path]:
-    """Keep other commands from an output while the block runs.
+    """Lock an output against other commands while the block runs.
 
-    What a killed command left out of its place is put back first.
+    If an earlier command was killed, the result that it had moved away is restored first.
 
     Parameters
     ----------
     target
         The output.
     refusal
-        Says what of a killed command's must not be removed.
+        Says why a folder left by a killed command must not be removed.
 
     Yields
     ------
-    A folder beside it, closed to others, that is removed in the end.
+    A folder beside it, private to this user, that is removed at the end.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def reserved(target: Path, refusal: Refusal = lambda found: None) -> Iterator[Pa
                     raise
                 else:
                     _empty(aside, settled=True)
-                finally:  # the lock last: whoever comes now must not find ours
+                finally:  # the lock last, so that no other command sees our files
                     (aside / "lock").unlink(missing_ok=True)
                     with suppress(OSError):
                         aside.rmdir()
@@ -166,7 +166,7 @@ def reserved(target: Path, refusal: Refusal = lambda found: None) -> Iterator[Pa
 
 
 def refuse_to_replace_input(folder: Path, path: Path) -> None:
-    """Refuse a folder for results that what they are made of lies in.
+    """Refuse to replace a folder that contains the measurement being read.
 
     Raises
     ------
@@ -210,9 +210,9 @@ def _beside(target: Path) -> Path:
 
 
 def _refuse_strangers(aside: Path) -> None:
-    """Refuse a folder that somebody else has put there, or a link: what is in it would be removed.
+    """Refuse a temporary folder made by another user, or a link: its content would be removed.
 
-    Its name can be foreseen, and others may write to the folder it lies in.
+    Its name is predictable, and other users may be able to write to the parent folder.
     """
     try:
         found = aside.lstat()
@@ -226,7 +226,7 @@ def _refuse_strangers(aside: Path) -> None:
 
 
 def _put_in_place(aside: Path, target: Path, refusal: Refusal) -> None:
-    """Give what was written its name, if what has that name now may be replaced."""
+    """Move the new result to ``target``, if what is there now may be replaced."""
     new = aside / "new"
     whole = aside / f"whole-{new.stat().st_ino}"
     new.rename(whole)
@@ -235,7 +235,7 @@ def _put_in_place(aside: Path, target: Path, refusal: Refusal) -> None:
         return
     reason = _why_kept(target, refusal)
     if reason is None and exchange(whole, target):
-        reason = _why_kept(whole, refusal)  # looked at where nobody changes it any more
+        reason = _why_kept(whole, refusal)  # checked after the move: now stable
         if reason is None:
             _discard(whole)
             return
@@ -278,7 +278,7 @@ def _kept_beside(whole: Path, target: Path) -> Path:
 
 
 def _recover(aside: Path, target: Path, refusal: Refusal) -> None:
-    """Put back what a command that ended in between left out of its place; remove its own.
+    """Restore the earlier result after a command was killed, and remove that command's files.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which folders are our own results, and may be replaced by new ones."""
+"""Recognition of folders that mmslam wrote, which new results may replace."""
 
 import json
 from pathlib import Path

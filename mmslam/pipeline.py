@@ -1,4 +1,4 @@
-"""From a scenario to a measurement, to an answer, and to a folder of results."""
+"""From a scenario to a measurement, to an estimate, and to a folder of results."""
 
 import time
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What comes from data, made harmless for terminals, pages and file names.
+"""Text from data files, made safe for terminals, HTML pages and file names.
 
 A name in somebody's file may hold control characters, which make a terminal write files, move the
 cursor or change its title, and marks of writing direction, which show another text than is there
@@ -22,14 +22,14 @@ LONGEST_FILE_NAME = 100
 
 
 def visible(text: str) -> str:
-    """Show what a terminal would obey, or not show, by its number; line ends and tabs stay."""
+    """Return text with control and invisible characters as code numbers; newlines and tabs stay."""
     if text.isprintable():
         return text
     return "".join(sign if sign.isprintable() or sign in "\n\t" else _number(sign) for sign in text)
 
 
 def message(text: str) -> str:
-    """Make a message of text that may repeat anything: visible, and its words and lines cut."""
+    """Return text made visible, with overlong words and lines cut, for an error message."""
     return "\n".join(_cut(line) for line in visible(text).split("\n"))
 
 
@@ -44,7 +44,7 @@ def json_text(document: Mapping[str, Any] | list[Any]) -> str:
 
 
 def file_name(text: str) -> str:
-    """Make a name that data give a file's: no separator, nothing hidden, not too long."""
+    """Return a safe file name: no separator, no invisible character, limited length."""
     name = "".join(
         sign if sign.isprintable() and sign not in _SEPARATORS else "_" for sign in text
     ).strip(" .")
@@ -55,9 +55,9 @@ def file_name(text: str) -> str:
 
 
 def drawn_plainly(figure: Any) -> None:
-    """Have what data put into a figure drawn as it is: no formula between two dollar signs.
+    """Draw the text of a figure literally, without Matplotlib's mathtext between dollar signs.
 
-    Numbers on the axes are formulas, too, but get their text only when the figure is drawn.
+    Tick labels may be mathtext, and stay so: they get their text only when the figure is drawn.
 
     Parameters
     ----------

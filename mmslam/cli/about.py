@@ -1,4 +1,4 @@
-"""Commands that tell facts: of claims, of a radio's design, of this installation."""
+"""Commands ``validate``, ``design`` and ``info``: claims, radio design, this installation."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -11,7 +11,7 @@ app = typer.Typer(
     name="mmslam",
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    pretty_exceptions_enable=False,  # a bug's traceback is best read whole and plain
+    pretty_exceptions_enable=False,  # an internal error prints Python's plain, complete traceback
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

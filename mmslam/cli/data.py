@@ -1,4 +1,4 @@
-"""Commands that bring data in and out: other programs' files."""
+"""Commands ``import`` and ``export``: files of other programs."""
 
 from pathlib import Path
 from typing import Annotated, Any

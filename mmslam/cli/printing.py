@@ -15,7 +15,7 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 
 def print_outcome(result: Mapping[str, Any], folder: Path, as_json: bool) -> None:
-    """Print what a run or an estimate gave."""
+    """Print the result of a run or an estimate, as text or as one JSON document."""
     if as_json:
         print_json(result)
         return
@@ -26,7 +26,7 @@ def print_outcome(result: Mapping[str, Any], folder: Path, as_json: bool) -> Non
 
 
 def print_written(path: Path, measurement: Any, as_json: bool, notes: Sequence[str] = ()) -> None:
-    """Print what a measurement file holds, and what is to be known about it."""
+    """Print a summary of a measurement file and the notes about its data."""
     from mmslam.terminal.summary import measurement_summary
 
     summary = measurement_summary(measurement)

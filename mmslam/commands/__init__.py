@@ -1,4 +1,4 @@
-"""What the commands do, without the command line: run, write, and say it in lines.
+"""The commands without their command-line options: compute, write files, return lines of text.
 
 Each module serves one command and the function of the same purpose in ``mmslam``.
 """

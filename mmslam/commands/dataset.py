@@ -1,4 +1,4 @@
-"""Making datasets: what the command does, says and answers."""
+"""The command ``dataset``: simulation of many samples into one store, and its messages."""
 
 import os
 import shutil
@@ -30,7 +30,7 @@ def make_dataset(
     retry_failed: bool = False,
     progress: builder.Tally | None = None,
 ) -> Summary:
-    """Simulate many variations of a scenario into one store, or go on with one that was begun.
+    """Simulate many variations of a scenario into one store, or resume an unfinished one.
 
     Parameters
     ----------
@@ -45,20 +45,20 @@ def make_dataset(
     retry_failed
         Make samples again that have failed.
     progress
-        Told how many samples are done, have failed, and there are.
+        Called with the numbers of samples done, failed, and in all.
 
     Returns
     -------
-    How many samples there are, have failed, and were made now.
+    The numbers of samples in all, failed, and made by this call.
 
     Raises
     ------
     ScenarioError
         If the configuration is wrong.
     OutputError
-        If the dataset cannot go where it should, or its workers are lost.
+        If the store cannot be written, or its workers are lost.
     ResumableInterruption
-        On Ctrl-C; says how to go on.
+        On Ctrl-C; the message says how to resume.
 
     Examples
     --------
@@ -114,7 +114,7 @@ def make(config: Path, target: Path, *, workers: Workers, retry_failed: bool) ->
 
 
 def look_ahead(config: Path, target: Path, *, workers: int) -> Mapping[str, Any]:
-    """Judge by one sample what a dataset will take; return the document for JSON."""
+    """Estimate time, size and memory of a dataset from one sample; return the JSON document."""
     job = builder.plan_dataset(config, target)
     with _errors_told():
         found = builder.forecast(job)
@@ -122,7 +122,7 @@ def look_ahead(config: Path, target: Path, *, workers: int) -> Mapping[str, Any]
 
 
 def lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """Say what :func:`make` has returned."""
+    """Yield the lines that describe the document of :func:`make`."""
     yield (
         f"{document['file']}: {document['samples']} samples, {document['failed']} failed"
         + (f", {document['made_now']} made now" if document["made_now"] else "")
@@ -137,7 +137,7 @@ def lines(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 def forecast_lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """Say what :func:`look_ahead` has returned."""
+    """Yield the lines that describe the document of :func:`look_ahead`."""
     workers, seconds = document["workers"], document["sample_s"]
     yield f"{document['samples']} samples, {seconds:.3g} s each on one thread"
     yield f"time    {told_time(document['time_s'])} with {workers} workers of this machine"
@@ -156,7 +156,7 @@ def forecast_lines(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 def chosen_workers(processes: int | None, scheduler: str | None) -> Workers:
-    """Return where work is done: by default one process for each processor."""
+    """Return the workers: a Dask scheduler's, or local processes, by default one for each core."""
     if scheduler is not None and processes is not None:
         raise typer.BadParameter("--workers is for this machine's; with --scheduler leave it out")
     return Workers(processes=_processors() if processes is None else processes, scheduler=scheduler)

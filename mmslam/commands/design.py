@@ -14,9 +14,9 @@ from validation.design.design_table import DesignRow, design_table
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Design:
-    """What a radio, an array and a distance allow."""
+    """Resolutions, unambiguous ranges and field regions of a radio and an array at a distance."""
 
-    options: Mapping[str, Any]  # what it was worked out for
+    options: Mapping[str, Any]  # the arguments of :func:`design`
     rows: tuple[DesignRow, ...]
 
     def __getitem__(self, name: str) -> DesignRow:
@@ -61,13 +61,13 @@ def design(
     Parameters
     ----------
     scenario
-        Whose radio and array (along its axis) serve where nothing else is given.
+        Scenario whose radio and array (along its axis) supply the values that are not given.
     start_ghz, stop_ghz, points
         The band, and the frequencies in it.
     elements, spacing_mm
         Of the linear array.
     distance_m, angle_deg
-        Of target and user: how far, and how far off broadside at most.
+        Distance of target and user [m], and their largest angle off broadside [degree].
 
     Raises
     ------

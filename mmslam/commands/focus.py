@@ -1,4 +1,4 @@
-"""Images of a measurement alone: focused, drawn and kept, with no search for walls or users."""
+"""The command ``image``: a SAR image of a measurement, without a search for walls or users."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,7 @@ DOTS_PER_INCH = 150
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FocusedImage(Image):
-    """An image of a measurement, and what was chosen to form it."""
+    """A SAR image of a measurement, with the region, pixel and method chosen to form it."""
 
     method: str = ""
     notes: tuple[str, ...] = ()
@@ -49,7 +49,7 @@ def image(
     Parameters
     ----------
     measurement
-        With an echo. A truth beside it is taken off first.
+        A measurement with an echo. Its ground truth, if any, is not used.
     x, y, z
         First and last coordinate of the region, in the world's frame. [m]
     pixel
@@ -59,7 +59,7 @@ def image(
 
     Returns
     -------
-    The image; what is left None is chosen by where the energy is, and its notes say how.
+    The image. Arguments left None are chosen from where the echo's energy is; its notes say how.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def image_lines(document: dict[str, Any], folder: Path) -> list[str]:
 
 
 def projections(focused: Image) -> Figure:
-    """Draw a plane as it is, a volume by its brightest voxels from three sides."""
+    """Draw a plane; of a volume, its maximum-intensity projections along the three axes."""
     if focused.grid.z.size == 1:
         left, right, bottom, top = focused.grid.extent
         figure = Figure(figsize=(7.5, 6.0), layout="constrained")

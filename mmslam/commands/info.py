@@ -1,4 +1,4 @@
-"""What this installation runs on: backend, LLVM, threads, versions."""
+"""The command ``info``: backend, LLVM, threads and versions of this installation."""
 
 import os
 import platform

@@ -1,4 +1,4 @@
-"""Running sweeps: what the command does, writes and says."""
+"""The command ``sweep``: location errors over a grid of parameters, its files and messages."""
 
 import json
 import time
@@ -49,13 +49,13 @@ def sweep(
         Where tables and figures are written; an earlier sweep's are replaced, anything else is
         refused. None: nowhere.
     cache
-        What was computed is kept there: the same sweep goes on, a longer one computes what is new.
+        Folder of computed points: the same sweep resumes, an extended one computes only new points.
     workers
         Processes; 0: this one. With more, a script needs ``if __name__ == "__main__":`` around it.
     scheduler
         Address of a Dask scheduler, whose workers are used instead.
     progress
-        Told how many points are done, have failed, and there are.
+        Called with the numbers of points done, failed, and in all.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def run(config: Path, folder: Path, *, cache: Path, workers: Workers) -> Mapping
 
 
 def look_ahead(config: Path, *, cache: Path, workers: int) -> Mapping[str, Any]:
-    """Judge by one point what a sweep will take; return the document for JSON."""
+    """Estimate the time of a sweep from one point; return the JSON document."""
     job = plan_sweep(config, cache)
     missing = missing_points(job)
     seconds = 0.0
@@ -129,7 +129,7 @@ def look_ahead(config: Path, *, cache: Path, workers: int) -> Mapping[str, Any]:
 
 
 def forecast_lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """Say what :func:`look_ahead` has returned."""
+    """Yield the lines that describe the document of :func:`look_ahead`."""
     yield f"{document['points']} points, {document['missing']} of them not computed yet"
     if document["missing"]:
         yield (
@@ -139,7 +139,7 @@ def forecast_lines(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 def lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """Say what :func:`run` has returned."""
+    """Yield the lines that describe the document of :func:`run`."""
     yield f"{document['folder']}: {document['points']} points, {document['failed']} failed"
     yield f"{'median/mm':>10} {'90 %/mm':>10} {'worst/mm':>10} {'bound/mm':>10} {'found':>6}"
     for case in document["cases"]:

@@ -1,4 +1,4 @@
-"""A user that moves, from a dataset whose samples are times to a track in a file and a figure."""
+"""The command ``track``: from a dataset whose samples are times to tracks and their figure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ Truths = Sequence[Mapping[str, Float[np.ndarray, " 3"]]]
 """Where each user truly is at each time; empty where it is not known."""
 
 LEAST_RIVAL = 0.01
-"""Probability below which another choice is not told: one in a hundred tracks. [-]"""
+"""Probability below which another choice among ambiguous positions is not reported. [-]"""
 
 
 def track(
@@ -50,12 +50,12 @@ def track(
         A dataset whose samples are times (a variable ``time`` [sample] in seconds says when each
         was measured), or measurements in the order of time.
     step
-        Time between them; it goes before what the dataset says, and measurements by themselves
-        need it. [s]
+        Time between measurements; it overrides the dataset's own times, and is required for a
+        sequence of measurements. [s]
     acceleration
         Spectral density of the users' acceleration: how freely they move. [m²/s³]
     progress
-        Told each sample.
+        Called after each sample.
 
     Returns
     -------
@@ -64,8 +64,8 @@ def track(
     Raises
     ------
     MeasurementError
-        If the dataset cannot be read, has no samples, nobody says when they were measured, or no
-        sample holds a pilot.
+        If the dataset cannot be read or has no samples, the times of measurement are unknown, or
+        no sample holds a pilot.
 
     Examples
     --------

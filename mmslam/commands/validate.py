@@ -49,21 +49,21 @@ def chosen_claims(only: Sequence[str], *, quick: bool) -> tuple[Claim, ...]:
 def check_claims(
     only: Sequence[str], *, quick: bool, folder: Path, fresh: bool, shown: Callable[[Any], None]
 ) -> Mapping[str, Any]:
-    """Measure claims, show each as it is known, and write everything to a folder.
+    """Measure claims, show each when it is done, and write everything to a folder.
 
     Parameters
     ----------
     only
         Keys of claims; empty: all.
     quick
-        Whether quick forms are enough.
+        Whether the quick form of each claim is measured.
     folder
-        Gets each claim's numbers and figure, and ``claims.json``. Figures of an earlier run of
-        the same code are kept, so that a run that was cut off is gone on with.
+        Where each claim's numbers and figure and ``claims.json`` are written. Results of an
+        earlier run of the same code are reused, so that an interrupted run resumes.
     fresh
-        Whether they are measured again instead.
+        Whether all are measured again instead.
     shown
-        Is given what is to be printed.
+        Called with each table or text to be printed.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def check_claims(
     OutputError
         If there is no such claim, or the folder holds something else.
     ResumableInterruption
-        On Ctrl-C; says how to go on.
+        On Ctrl-C; the message says how to resume.
     """
     claims, effort = chosen_claims(only, quick=quick), _effort(quick)
     _refuse_foreign(folder)
@@ -120,12 +120,13 @@ def _checked(
 def refuse_impossible(
     only: Sequence[str], *, quick: bool, record: Path | None, against: Path | None
 ) -> None:
-    """Refuse, before anything is measured, what could not be kept or compared.
+    """Refuse, before any measurement, options whose results cannot be recorded or compared.
 
     Raises
     ------
     OutputError
-        If claims are chosen and all are to be kept, or nothing is stated in this form.
+        If only some claims are chosen but all are to be recorded, or no recorded results exist to
+        compare with.
     """
     effort = _effort(quick)
     if record is not None and only:
@@ -140,7 +141,7 @@ def refuse_impossible(
 
 
 def record_run(document: Mapping[str, Any], folder: Path, run_folder: Path) -> None:
-    """Keep a run of all claims in the documentation.
+    """Record the results of all claims in the documentation.
 
     Raises
     ------
@@ -156,7 +157,7 @@ def record_run(document: Mapping[str, Any], folder: Path, run_folder: Path) -> N
 
 
 def drift(document: Mapping[str, Any], folder: Path) -> list[str]:
-    """Compare a run with what the documentation states; a line for each figure that is off."""
+    """Compare a run with the recorded results; return a line for each figure that differs."""
     return drifted(document, read_record(folder, document["effort"]) or {"claims": []})
 
 
@@ -200,7 +201,7 @@ def summary_line(document: Mapping[str, Any]) -> str:
 
 @contextmanager
 def console_on_stdout() -> Iterator[Console]:
-    """Give what prints on stdout, whatever stdout is turned to meanwhile; wide without terminal."""
+    """Yield a console on the present stdout, even if stdout is redirected in the block."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as stream:
         width = None if stream.isatty() else _WIDTH
         yield Console(file=stream, highlight=False, width=width)

@@ -1,4 +1,4 @@
-"""An array by its file and name, whatever the format; nothing but numbers is read."""
+"""Reading of one numeric array by file and name, independent of the file format."""
 
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ class ArrayFiles:
     """Reads arrays by file and name; a CSV file is read once."""
 
     def __init__(self, *, frequency: str | None, coordinates: tuple[str, ...]) -> None:
-        """Know the columns that tell a CSV row's frequency and position."""
+        """Take the names of the columns that hold a CSV row's frequency and position."""
         self._frequency = frequency
         self._coordinates = coordinates
         self._tables: dict[Path, CsvGrid] = {}
@@ -63,7 +63,7 @@ class ArrayFiles:
             The variable, dataset or column; None for an .npy file of one array (of several, it is
             their number, from 0), a GSSI file, and a text file that is one matrix.
         gaps
-            Let NaN through: what was not measured is left out elsewhere.
+            Accept NaN, which marks positions that were not measured; the caller removes them.
 
         Raises
         ------

@@ -45,7 +45,7 @@ class ArrayReader:
     """Reads signals from a file of arrays, or from a folder with one for each position."""
 
     def __init__(self, source: Path, mapping: SweepMapping, base: Path) -> None:
-        """Know the data, and the folder to which the mapping's names are relative."""
+        """Take the data, and the folder to which the mapping's file names are relative."""
         self._source, self._mapping, self._base = source, mapping, base
         places = [mapping.positions_of(table) for table in mapping.signals().values()]
         if mapping.echo is not None and mapping.echo.transmit_positions is not None:
@@ -185,7 +185,7 @@ class ArrayReader:
         table: SamplesTable,
         source: Path,
     ) -> tuple[Samples, Frequencies, tuple[str, ...]]:
-        """Bring samples over frequency, time or a chirp to frequencies."""
+        """Convert samples over frequency, time or a chirp to a frequency sweep and its remarks."""
         if self._mapping.time is not None:
             return spectrum_of_traces(where, values, self._times(source), self._mapping.time)
         if self._mapping.chirp is not None:
@@ -228,7 +228,7 @@ class ArrayReader:
 
 
 def _merged(table: SignalTable, given: SamplesTable) -> SamplesTable:
-    """Fill what a background or response leaves out from its signal; its file stands apart."""
+    """Complete the table of a background or response by its signal's keys, but not by its file."""
     own = set(given.model_fields_set)
     if "axes" in own:
         own.add("take")

@@ -91,7 +91,7 @@ def export_netcdf(store: Path, file: Path, *, samples: Sequence[int] | None = No
     file
         The file to write; it must not exist.
     samples
-        Of a dataset; None: all.
+        Sample numbers of a dataset; None: all.
 
     Returns
     -------
@@ -214,7 +214,7 @@ def _arrays(root: zarr.Group, store: Path, samples: Sequence[int] | None) -> lis
 
 @contextmanager
 def _new(file: Path, kind: str) -> Iterator[Path]:
-    """Give a path to write to, that becomes ``file`` when all is written."""
+    """Yield a temporary path, which is renamed to ``file`` once it is complete."""
     with new_file(file) as part:
         try:
             yield part

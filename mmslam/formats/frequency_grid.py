@@ -1,4 +1,4 @@
-"""The frequencies of a sweep in the estimator's order: rising, of the band, in equal steps."""
+"""Conversion of a sweep to the estimator's grid: rising, within the band, in equal steps."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ def ordered_sweep(
     frequencies: Float[np.ndarray, " points"],
     mapping: SweepMapping,
 ) -> OrderedSweep:
-    """Turn falling frequencies, choose the band, and bring unequal steps to equal ones.
+    """Reverse falling frequencies, select the band, and resample unequal steps to equal ones.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def ordered_sweep(
     frequencies
         Of their second axis. [Hz]
     mapping
-        The band, and to what the frequencies were rounded.
+        The band, and the rounding of the frequencies in the file.
 
     Raises
     ------

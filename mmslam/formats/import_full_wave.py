@@ -23,7 +23,7 @@ WALL = "wall"
 
 @dataclass(frozen=True, kw_only=True)
 class Imported:
-    """A measurement and, if the source told, where things really were."""
+    """A measurement and, if the source holds it, the ground truth."""
 
     measurement: Measurement
     truth: xr.Dataset | None

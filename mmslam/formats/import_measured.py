@@ -1,4 +1,4 @@
-"""Measured data of any layout becomes a measurement, told by a mapping file what is what.
+"""Import of measured data of any layout, described by a mapping file.
 
 The order of the steps: read; bring to exp(+jωt); subtract the background; divide the radio's
 response out; take the cables' delay out. The steps are those of
@@ -41,7 +41,7 @@ Data = TypeVar("Data", Echo, Uplink)
 
 @dataclass(frozen=True, kw_only=True)
 class Import:
-    """A measurement, and what looked odd in the data."""
+    """A measurement, and remarks on implausible data."""
 
     measurement: Measurement
     notes: tuple[str, ...]
@@ -55,7 +55,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
     source
         A folder of Touchstone files or of one array or CSV file for each position, or one file.
     mapping
-        What in it is what.
+        Describes the data: variables, axes, units and sign convention.
     base
         Folder to which the mapping's file names are relative.
 
@@ -221,7 +221,7 @@ def _notes(
 
 
 def _shared_note(name: str, data: Echo) -> str | None:
-    """Propose to subtract what all positions share, where it covers everything else."""
+    """Propose to subtract the signal common to all positions if it is far above the rest."""
     shared = shared_signal(data)
     if shared is None or shared.above_rest_db < PROPOSED_DB:
         return None

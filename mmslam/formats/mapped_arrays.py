@@ -1,4 +1,4 @@
-"""Arrays of any axis order, unit and kind of number, as a mapping tells them, brought to ours."""
+"""Conversion of arrays of any axis order, unit and number type to ours, by a mapping."""
 
 from pathlib import Path
 
@@ -72,7 +72,7 @@ def array_samples(
     Raises
     ------
     MeasurementError
-        If the axes do not fit the array, or real samples are not said to be.
+        If the axes do not fit the array, or real samples are not declared by ``analytic``.
     """
     reader = _Parts(files=files, path=path, name=name, table=table, base=base, sweep=sweep)
     values, axes = reader.samples()

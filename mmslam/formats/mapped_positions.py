@@ -1,4 +1,4 @@
-"""Positions as a mapping tells them: a list, coordinates of a grid or a mesh, or equal steps."""
+"""Positions by a mapping: a list, coordinates of a grid or a mesh, or equal steps."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The mapping file: what in somebody's measured data is what, in which order, sign and unit.
+"""The mapping file: it describes the variables, axes, sign and units of measured data.
 
 A TOML file beside the data. Paths in it are relative to it. Every table is checked before a
 sample is read; see :class:`SweepMapping` for the keys.

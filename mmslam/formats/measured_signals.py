@@ -1,7 +1,7 @@
 """Signals as measured, from a folder of Touchstone files or from files of arrays.
 
-Both readers bring units to metres and hertz and the time convention to exp(+jωt), and refuse
-what cannot be; nothing is calibrated here.
+Both readers convert units to metres and hertz and the time convention to exp(+jωt), and refuse
+impossible values; nothing is calibrated here.
 """
 
 from collections.abc import Iterator, Sequence
@@ -67,7 +67,7 @@ class SignalReader(Protocol):
 
 @contextmanager
 def told(name: Path | str) -> Iterator[None]:
-    """Put the file or table at fault before a message."""
+    """Prefix error messages in the block with the name of the file or table."""
     try:
         yield
     except MeasurementError as error:
@@ -78,7 +78,7 @@ class FolderReader:
     """Reads signals from folders of Touchstone files."""
 
     def __init__(self, source: Path, mapping: SweepMapping, base: Path) -> None:
-        """Know the data, and the folder to which the mapping's names are relative."""
+        """Take the data, and the folder to which the mapping's file names are relative."""
         self._source, self._mapping, self._base = source, mapping, base
         self._scans: dict[tuple[Path, ...], Scan] = {}
         if mapping.frequency or mapping.time or mapping.chirp:
@@ -180,7 +180,7 @@ def finished(
     transmit_positions: Positions | None = None,
     notes: tuple[str, ...] = (),
 ) -> Signal:
-    """Make a signal of what was read: without the positions that were not measured, in order.
+    """Return a signal without unmeasured positions, over rising, equally spaced frequencies.
 
     Parameters
     ----------
@@ -197,13 +197,13 @@ def finished(
     leave_out
         Positions to leave out, by their number.
     notes
-        What was remarked before.
+        Earlier remarks.
 
     Raises
     ------
     MeasurementError
-        If a part of a position's samples is missing, too many positions are, or frequencies cannot
-        be brought to equal steps.
+        If some but not all samples of a position are missing, too many positions are missing, or
+        the frequencies cannot be converted to equal steps.
     """
     keep, dead = measured_positions(name, samples, leave_out)
     found = ordered_sweep(name, samples[keep], frequencies, mapping)
@@ -224,8 +224,8 @@ def measured_positions(
     Raises
     ------
     MeasurementError
-        If a number of `leave_out` is none of a position, samples of a position are missing in
-        part, or more than :data:`MOST_MISSING` of the positions hold nothing.
+        If a number in `leave_out` is not a position's, some but not all samples of a position are
+        missing, or more than the share :data:`MOST_MISSING` of the positions is empty.
     """
     count = len(samples)
     beyond = [number for number in leave_out if number >= count]
@@ -261,7 +261,7 @@ def measured_positions(
 
 
 def signed(name: str, values: np.ndarray, mapping: SweepMapping) -> np.ndarray:
-    """Bring samples to exp(+jωt), and refuse those that no receiver gives."""
+    """Return samples in the convention exp(+jωt); refuse impossible magnitudes."""
     check_samples(name, values)
     return np.conj(values) if mapping.time_convention == "exp(-jwt)" else values
 
@@ -274,7 +274,7 @@ def check_places(
     *,
     counted: bool = False,
 ) -> tuple[str, ...]:
-    """Refuse an array of a size that cannot be, at its highest frequency [Hz]."""
+    """Refuse an implausible size or spacing of the array, judged at its highest frequency [Hz]."""
     note = check_positions(
         name,
         positions,

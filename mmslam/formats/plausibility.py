@@ -32,12 +32,12 @@ FARTHEST = 1000.0
 
 
 def check_samples(name: str, samples: Num[np.ndarray, "positions points"]) -> None:
-    """Refuse samples that no receiver gives.
+    """Refuse samples of an impossible magnitude.
 
     Raises
     ------
     MeasurementError
-        If one is above :data:`LARGEST_SAMPLE`; NaN is no number here.
+        If a magnitude is above :data:`LARGEST_SAMPLE`; NaN is ignored.
     """
     parts = (np.abs(samples.real), np.abs(samples.imag))
     largest = max(float(np.fmax.reduce(part, axis=None)) for part in parts)  # without NaN
@@ -51,7 +51,7 @@ def check_samples(name: str, samples: Num[np.ndarray, "positions points"]) -> No
 def check_frequencies(
     name: str, frequencies: Float[np.ndarray, " freqs"], remedy: str
 ) -> str | None:
-    """Refuse frequencies at which no such radio works; remark those of few.
+    """Refuse frequencies outside the range of imaging radars; remark unusual ones.
 
     Raises
     ------
@@ -157,8 +157,8 @@ def sign_note(
 ) -> str | None:
     r"""Remark that the delays look negative: the other time convention may be meant.
 
-    On a grid of step Δf, delays are told modulo 1/Δf; negative ones fill the upper half of it.
-    What a room sends back comes in the lower half, where its reach is less than c/2Δf of path.
+    On a grid of step Δf, delays are known modulo 1/Δf; negative ones appear in the upper half of
+    this interval. Echoes of a room are in the lower half if its paths are shorter than c/2Δf.
     """
     power = (np.abs(np.fft.ifft(samples, axis=1)) ** 2).sum(axis=0)
     half = len(power) // 2

@@ -1,4 +1,4 @@
-"""Results: the answer as tables and plots, as a JSON document, as figures and a report."""
+"""Results: the estimate as tables and plots, as a JSON document, as figures and a report."""
 
 import lazy_loader
 

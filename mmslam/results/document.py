@@ -40,7 +40,7 @@ def result_document(
     *,
     timings: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """Lay out what was found, and how far it is from the truth where that is known.
+    """Return the estimate as a document, with its errors where the truth is known.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def result_document(
 
 
 def plain(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn what a document holds into what JSON knows; NaN and infinity become null."""
+    """Convert the values of a document to JSON types; NaN and infinity become null."""
     turned = _plain(document)
     assert isinstance(turned, dict)
     return turned
 
 
 def to_json(document: Mapping[str, Any]) -> str:
-    """Write a document as JSON text; NaN is refused, it must have become null before."""
+    """Write a document as JSON text; NaN raises ValueError (:func:`plain` turns it into null)."""
     return json_text(document) + "\n"
 
 
@@ -121,7 +121,7 @@ def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:
         "name": user.name,
         "status": user.status,
         "reason": user.reason,
-        # That the user is there, given map, paths and priors; null where it was not worked out.
+        # Posterior probability of the position, given map, paths and priors; null if not computed.
         "probability": user.probability,
         "estimate_m": user.position,
         "covariance_m2": user.covariance,

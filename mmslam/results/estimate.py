@@ -1,4 +1,4 @@
-"""The answer as the front door hands it out: the estimator's, which prints and draws itself.
+"""The estimate of the Python interface: the estimator's results, with tables and plots.
 
 Each class here is one of :mod:`estimator.results.estimate` with a short table for a terminal, a
 small figure and table for a notebook, and plots. The numbers are the same objects.
@@ -32,7 +32,7 @@ _T = TypeVar("_T")
 
 
 class _Shown(ABC):
-    """What is shown by its tables, and by a small figure if it can be plotted."""
+    """Base of results that print as tables, and in a notebook also as a small figure."""
 
     @abstractmethod
     def tables(self) -> list[Table]:
@@ -50,7 +50,7 @@ class _Shown(ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class User(_Shown, plain.UserEstimate):
-    """Where one user is, or why that cannot be said."""
+    """Estimated position of one user, or the reason why there is none."""
 
     @property
     def uncertainty_m(self) -> float | None:
@@ -66,7 +66,7 @@ class User(_Shown, plain.UserEstimate):
         return plot_user(self, truth=truth, ax=ax)
 
     def tables(self) -> list[Table]:
-        """Return the answer and the waves that it rests on."""
+        """Return the position, and the paths from which it was estimated."""
         waves = [
             (
                 f"{degrees(path.aoa):.3f}°",
@@ -88,7 +88,7 @@ class Mirror(_Shown, plain.Mirror):
     """A flat wall of finite extent, at its true (unfolded) place."""
 
     def tables(self) -> list[Table]:
-        """Return its ends and how well they are known."""
+        """Return its ends and their uncertainty."""
         return [_mirrors_table([self])]
 
 
@@ -97,7 +97,7 @@ class Target(_Shown, plain.Target):
     """An object that is no mirror."""
 
     def tables(self) -> list[Table]:
-        """Return its place, and where the image shows it."""
+        """Return its position, and its apparent position in the raw image."""
         return [_targets_table([self])]
 
 
@@ -127,7 +127,7 @@ class Image(_Shown, plain.Image):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CorrectedImage(Image, plain.CorrectedImage):
-    """An image in which each pixel has the raw image's value from where it was seen."""
+    """The image with ghosts unfolded: each pixel has the raw image's value at its mirror image."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -135,13 +135,13 @@ class AngleRangeMap(_Shown, plain.AngleRangeMap):
     """The spherical-wave matched filter of one user's pilot over angle and path length."""
 
     def plot(self, *, user: plain.UserEstimate | None = None, ax: "Axes | None" = None) -> "Axes":
-        """Draw it in decibels below its peak, and mark what was found of the user."""
+        """Draw it in decibels below its peak, and mark the user's paths."""
         from mmslam.results.plots import plot_angle_range_map
 
         return plot_angle_range_map(self, user=user, ax=ax)
 
     def tables(self) -> list[Table]:
-        """Return what it spans."""
+        """Return its ranges of angle and path length."""
         angles, lengths = self.aoa, self.path_length
         rows = [
             ("angle", str(angles.size), *(f"{degrees(angles[end]):.2f}°" for end in (0, -1))),
@@ -193,7 +193,7 @@ class Users(tuple[User, ...]):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate(_Shown, plain.Estimate):
-    """The whole answer to one measurement; it knows no truth.
+    """All that was estimated from one measurement; it does not contain the truth.
 
     Examples
     --------
@@ -217,7 +217,7 @@ class Estimate(_Shown, plain.Estimate):
 
     @classmethod
     def of(cls, estimate: plain.Estimate, measurement: model.Measurement) -> "Estimate":
-        """Dress what the estimator has answered to a measurement."""
+        """Convert the estimator's result for a measurement to these classes."""
         parts = _fields(plain.Estimate, estimate)
         parts |= {
             "users": Users(_user(user) for user in estimate.users),
@@ -240,7 +240,7 @@ class Estimate(_Shown, plain.Estimate):
 
     @cached_property
     def close_ups(self) -> tuple[AngleRangeMap, ...]:
-        """The maps once more, finely around each one's answer or peak; when first asked for."""
+        """Angle/range maps enlarged around each user's estimate or peak; made on first access."""
         return tuple(_as(AngleRangeMap, one) for one in self.close_up_maps.value)
 
     def plot(self, *, truth: Truth | None = None, ax: "Axes | None" = None) -> "Axes":
@@ -267,7 +267,7 @@ class Estimate(_Shown, plain.Estimate):
         Raises
         ------
         ValueError
-            If it is not known what measurement the answer is to.
+            If the estimate holds no measurement.
         """
         from mmslam.results.document import result_document
 
@@ -377,7 +377,7 @@ def _point(place: Float[np.ndarray, " 3"]) -> str:
 
 
 def _png(plot: Any) -> str:
-    """Draw on a figure of its own, which pyplot knows nothing of, and return it in base64."""
+    """Draw on a new figure outside pyplot, and return it as a PNG in base64."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_FIGURE, layout="constrained")

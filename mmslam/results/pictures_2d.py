@@ -18,8 +18,8 @@ from validation.figures.resolution_bars import draw_resolution_bars
 from validation.metrics.truth import Truth
 
 DOTS_PER_INCH = 150
-_DEEPEST_DB = -100.0  # below it there is hardly an image
-_NEAR = 0.01  # of a thing found, what the image shows of it [m]
+_DEEPEST_DB = -100.0  # lowest level of the colour scale
+_NEAR = 0.01  # radius around a target in which its image level is read [m]
 _CLOSE_UPS = 3  # users shown enlarged; more would be too small to read
 
 
@@ -139,7 +139,7 @@ def _floor_db(
     *,
     corrected: bool,
 ) -> float:
-    """Choose the darkest level so that the faintest thing found is seen, in steps of 10 dB."""
+    """Return the lowest level of the colour scale, so that all detections are visible [dB]."""
     middles = [0.5 * (mirror.start + mirror.end) for mirror in estimate.mirrors]
     places = [target.position for target in estimate.targets]
     things = np.array([*middles, *places]).reshape(-1, 3) if corrected else ghosts

@@ -27,7 +27,7 @@ def volume_figure(
     *,
     corrected: bool,
 ) -> Figure:
-    """Draw a volume from above, from the array and from the side, as far as anything is seen."""
+    """Draw a volume from above, from the array and from the side, cropped to its bright voxels."""
     box = figures_3d.box_around(np.concatenate([_bright(image), *_found(estimate)]))
     figure, grid = _three_views(box)
     for view, cell in zip(figures_3d.VIEWS, grid, strict=True):

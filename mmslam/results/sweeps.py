@@ -1,4 +1,4 @@
-"""The outcome of a sweep as the front door hands it out: a table, an array, a plot."""
+"""The result of a sweep in the Python interface: a table, an array, a plot."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # matplotlib's import takes half a second that not everybody 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Sweep:
-    """How far off users were located, at all points of a grid."""
+    """Position errors of users at all points of a parameter grid."""
 
     config: SweepConfig
     outcomes: tuple[Outcome, ...]
@@ -80,7 +80,7 @@ class Sweep:
 
 
 def told_bound(case: Mapping[str, Any]) -> float | None:
-    """Return the bound that holds for a wall that is found; with no rough wall, the other."""
+    """Return the position bound with estimated walls if there is one, else with known walls [m]."""
     told: float | None = case["bound_with_walls_m"]
     known: float | None = case["bound_m"]
     return known if told is None else told

@@ -1,4 +1,4 @@
-"""Tracks as the front door hands them out: by user, as a table, as a plot."""
+"""Tracks in the Python interface: by user, as a table, as a plot."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # matplotlib's import takes half a second that not everybody 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Tracks:
-    """The users of successive measurements with the tracks through their answers."""
+    """The users of successive measurements, with the tracks through their position estimates."""
 
     users: tuple[MovingUser, ...]
     mirrors: tuple[Mirror, ...]  # of the room, as the last measurement shows it

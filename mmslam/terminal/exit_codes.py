@@ -16,7 +16,7 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 
 
-# What a file's name or place is to blame for, whoever came upon it; other errors are bugs.
+# OS errors caused by the name or place of a file given by the user; other errors are bugs.
 _OF_THE_PLACE = frozenset(
     {
         errno.EACCES,
@@ -54,7 +54,7 @@ def told_clearly() -> Iterator[None]:
 
 @contextlib.contextmanager
 def stdout_kept_clean() -> Iterator[None]:
-    """Send to stderr whatever is printed meanwhile, by C++ libraries too.
+    """Redirect stdout to stderr within the block, for C++ libraries too.
 
     Mitsuba and LLVM write to the file descriptor, which no replacement of ``sys.stdout``
     reaches.

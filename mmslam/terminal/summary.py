@@ -10,7 +10,7 @@ from mmslam import own_results
 
 
 def summary_lines(result: Mapping[str, Any], folder: Path) -> Iterator[str]:
-    """Tell a result: users first, then mirrors and targets, notes, and where the files lie.
+    """Yield the lines of a result: users, mirrors and targets, notes, and the report's path.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an array's shape and the focus itself say of a mapping: boresight, sign and delays."""
+"""Checks of a mapping by the array's shape and the focused image: boresight, sign, delays."""
 
 import lazy_loader
 

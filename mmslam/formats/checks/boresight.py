@@ -1,4 +1,4 @@
-"""Where an array looks that does not say so: out of the area that its positions fill."""
+"""Boresight of an array if none is given: the normal of the area that its positions fill."""
 
 import numpy as np
 from jaxtyping import Float
@@ -20,7 +20,7 @@ def boresight_of(
     positions: Float[np.ndarray, "positions 3"],
     given: Float[np.ndarray, " 3"] | None,
 ) -> tuple[Float[np.ndarray, " 3"], str | None]:
-    """Return the boresight, and a remark if it is not what was given or usual.
+    """Return the unit boresight, and a remark if it is neither the given one nor y.
 
     Parameters
     ----------

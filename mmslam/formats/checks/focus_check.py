@@ -1,4 +1,4 @@
-"""What the focus of a measurement says of its delay and its sign: remarks, and the delay itself."""
+"""Delay offset and sign of the phase, checked by the curvature of the strongest wavefront."""
 
 import numpy as np
 from jaxtyping import Float
@@ -56,12 +56,12 @@ def focus_notes(
 
 
 def delay_by_focus(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> float:
-    """Return the path by which the delay exceeds what the curvature says. [m].
+    """Return the path length by which the delay exceeds that of the wavefront's curvature. [m].
 
     Raises
     ------
     MeasurementError
-        If no single point stands out, or its curvature tells no distance.
+        If no single point dominates, or its curvature is too uncertain to give a distance.
     """
     found = focus_delay(data, boresight)
     if found is None or found.coherence < SINGLE:

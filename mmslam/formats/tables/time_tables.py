@@ -1,4 +1,4 @@
-"""Sweeps that are not over frequency: traces over time, and the beats of a chirp."""
+"""Tables of time-domain data: traces over time, and beat signals of an FMCW chirp."""
 
 from typing import Annotated, Literal
 

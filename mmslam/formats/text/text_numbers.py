@@ -1,6 +1,6 @@
 """Numbers in a text file, and the names of its columns, as programs and instruments write them.
 
-Read are RFC 4180 (quoted names with commas in them), semicolons with decimal commas, tabs and
+Supported are RFC 4180 (quoted names with commas in them), semicolons with decimal commas, tabs and
 blanks, names in a remark above the numbers (CST), and files without names.
 """
 

@@ -1,4 +1,4 @@
-"""What is not a stepped sweep: traces over time, beats of a chirp, and recorders' own files."""
+"""Time-domain data: traces over time, beat signals of a chirp, and recorders' file formats."""
 
 import lazy_loader
 

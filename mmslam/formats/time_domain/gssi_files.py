@@ -44,7 +44,7 @@ def read_dzt(path: Path) -> GssiScans:
     Raises
     ------
     MeasurementError
-        If it is none, its header cannot be, or the data are not whole scans.
+        If it is not such a file, its header is invalid, or the data end within a scan.
     """
     try:
         size = path.stat().st_size

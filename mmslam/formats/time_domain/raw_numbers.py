@@ -1,4 +1,4 @@
-"""Numbers without a header, as recorders of radar chips write them; their layout is told."""
+"""Raw numbers without a header, from recorders of radar chips; the mapping gives the layout."""
 
 import math
 from pathlib import Path
@@ -25,7 +25,7 @@ def raw_array(path: Path, name: str, table: RawTable) -> np.ndarray:
     Raises
     ------
     MeasurementError
-        If the file's size is not the one that the layout gives.
+        If the size of the file does not agree with the layout.
     """
     if not is_file(path):
         raise MeasurementError(f"{path}: no such file; correct its name in the mapping")
