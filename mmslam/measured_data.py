@@ -29,8 +29,8 @@ def import_measured(
         The folder or file.
     mapping
         Describes the data (variables, axes, units): a TOML file, or its tables. None:
-        ``mapping.toml`` in the folder, if there is one; else ``source`` is a full-wave reference (an .npz of `echo`,
-        `aperture_position`, `frequency`, `uplink_…`), its truth included.
+        ``mapping.toml`` in the folder, if there is one; else ``source`` is a full-wave reference
+        (an .npz of `echo`, `aperture_position`, `frequency`, `uplink_…`), its truth included.
     uplink
         Which pilot of a full-wave reference; None: ``uplink_beam``, else the first.
 
