@@ -8,9 +8,9 @@ places u, and the level e of each path,
           \prod_{i \in h} p(e_i \mid n_i) \prod_{k} \frac{q_k}{\pi L} .
 
 The second product is over the paths k that are left. The integral is that of a Gaussian about the
-least-squares solution (Laplace's approximation):
-several paths that agree on one position weigh about a million times as much as one of them alone,
-because independent paths would rarely agree by chance. :math:`\pi_h` is the probability that the
+least-squares solution (Laplace's approximation): several paths that agree on one position weigh
+about a million times as much as one of them alone, because independent paths would rarely agree by
+chance. :math:`\pi_h` is the probability that the
 rays hit the walls within their extents as h says. A further hypothesis is *none of them*: a path
 was reflected by one more mirror, which the map does not show. Its weight is the product of a
 prior, of what the image shows where that mirror would have to be, and of the likelihood of the
