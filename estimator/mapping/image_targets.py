@@ -158,9 +158,9 @@ def _between(
     line = intensity[tuple(slice(None) if i == axis else int(k) for i, k in enumerate(place))]
     index = int(place[axis])
     shift = peak_shift(line, index)
-    return float(axis_places[index]) + (
-        shift * float(axis_places[1] - axis_places[0]) if shift else 0.0
-    )
+    if shift == 0:  # as on a single plane, which has no step
+        return float(axis_places[index])
+    return float(axis_places[index]) + shift * float(axis_places[1] - axis_places[0])
 
 
 def _in_shadow(

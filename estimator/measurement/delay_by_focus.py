@@ -16,6 +16,7 @@ curvature of the next step is known well enough by then. Variances are clustered
 "sandwich" of robust statistics), as what does not fit a point is alike at all frequencies.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,22 +86,20 @@ def focus_delay(data: Echo | Uplink, boresight: Float[np.ndarray, " 3"]) -> Focu
     view = _View.of(data, boresight)
     if view is None:
         return None
-    place = np.zeros(1 + view.across.shape[0])  # direction sines, curvature
+    place = None  # direction sines, curvature
     wave = speed_of_light / float(view.frequencies[-1])
     size, whole = FIRST_APERTURE * wave, view.extent
-    first = True
     while True:
         part = view.part(min(size, whole))
         if len(part.positions) >= 5:
-            begin = _coarse(part, whole) if first else _around(part, place)
+            begin = _coarse(part, whole) if place is None else _around(part, place)
             if begin is None:
                 return None
             place = _refined(part, begin)
-            first = False
         if size >= whole:
             break
         size *= 2
-    if first:
+    if place is None:
         return None
     return _judged(view, place, data)
 
@@ -194,13 +193,18 @@ class _View:
             other = np.linalg.norm(points[..., None, :] - self.transmit, axis=-1) - distance
         return np.asarray(sign * (legs + other))
 
+    def turned(
+        self, places: Float[np.ndarray, "*trials unknowns"]
+    ) -> Complex[np.ndarray, "*trials positions freqs"]:
+        """Return the samples without the phases of the paths to each of the places."""
+        waves = 2 * np.pi / speed_of_light * self.frequencies
+        return np.asarray(self.samples * np.exp(1j * self.paths(places)[..., None] * waves))
+
     def sums(
         self, places: Float[np.ndarray, "*trials unknowns"]
     ) -> Complex[np.ndarray, "*trials freqs"]:
         """Return the sums over the positions, focused on each of the places."""
-        waves = 2 * np.pi / speed_of_light * self.frequencies
-        phases = np.exp(1j * self.paths(places)[..., None] * waves)
-        return np.asarray(np.einsum("...mn,mn->...n", phases, self.samples))
+        return np.asarray(self.turned(places).sum(axis=-2))
 
     def coherence(
         self, places: Float[np.ndarray, "*trials unknowns"]
@@ -222,13 +226,11 @@ class _View:
 def _coarse(view: _View, whole: float) -> Float[np.ndarray, " unknowns"] | None:
     """Search all directions and curvatures of a small part of the whole aperture [m]."""
     cell = view.cell()
-    most = 1 / (NEAREST * whole)
-    steps = int(np.ceil(most / cell[-1]))
-    count = (2 * steps + 1) * float(np.prod(np.ceil(1.9 * 1.5 / cell[:-1])))
-    if count > MOST_TRIALS:
-        return None
+    steps = int(np.ceil(1 / (NEAREST * whole) / cell[-1]))
     lines = [np.arange(-0.95, 0.95, one / 1.5) for one in cell[:-1]]
     lines.append(cell[-1] * np.arange(-steps, steps + 1))
+    if math.prod(line.size for line in lines) > MOST_TRIALS:
+        return None
     places = np.stack([one.ravel() for one in np.meshgrid(*lines, indexing="ij")], axis=-1)
     few = view.thinned(-(-len(view.positions) // FEW[0]), -(-view.frequencies.size // FEW[1]))
     blocks = np.array_split(places, -(-len(places) // BLOCK))
@@ -318,7 +320,7 @@ def _covariance(
     lever = np.array(slopes).T
     lever = lever - lever.mean(axis=0)
     waves = 2 * np.pi / speed_of_light * view.frequencies
-    turned = view.samples * np.exp(1j * view.paths(place)[:, None] * waves)
+    turned = view.turned(place)
     mean = turned.mean(axis=0)
     # The phase of each sample against the mean, weighted by its power.
     errors = (turned * mean.conj()).imag

@@ -88,7 +88,7 @@ def test_arrays_that_tell_no_curvature_give_no_answer() -> None:
         samples=wave(circle, np.array([0.0, 0.02, 0.0]), 0.0), positions=circle, frequencies=BAND
     )
     assert focus_delay(around, BORESIGHT) is None
-    # Five positions across are 160 wavelengths: hundreds of thousands of directions, and aliases.
+    # Three positions across are 80 wavelengths: 200,000 directions for each curvature, and aliases.
     sparse = plane(9, 0.4)
     assert focus_delay(
         Echo(samples=wave(sparse, np.array([0.0, 9.0, 0.0]), 0.0), positions=sparse,
