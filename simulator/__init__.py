@@ -1,7 +1,7 @@
-"""The ray-traced forward model: from a scenario to the measurement of it.
+"""The ray-traced forward model: from a scenario to its simulated measurement.
 
-Physical optics on one frozen realisation of every rough surface, seen alike from all antennas and
-at all frequencies, with specular paths by the image method. It shares the data model and Dr.Jit's
+Physical optics on one frozen realisation of every rough surface, the same for all antennas and
+frequencies, with specular paths by the image method. It shares the data model and Dr.Jit's
 backend with the estimator, and no algorithm.
 """
 
@@ -9,7 +9,7 @@ import lazy_loader
 
 from estimator.compute import engine
 
-# Sionna aborts the whole process on an LLVM that is too old, so ask first.
+# Sionna aborts the whole process if LLVM is too old: check first.
 engine.backend()
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -24,7 +24,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """A simulated measurement and the truth behind it."""
+    """A simulated measurement and its ground truth."""
 
     measurement: Measurement
     truth: xr.Dataset
@@ -38,20 +38,20 @@ def simulate(
     Parameters
     ----------
     scenario
-        The truth: radio, base station, objects, users, noise.
+        Radio, base station, objects, users, noise.
     seed, sample
-        Which realisation of roughness and noise; each of them is a stream of its own.
+        Which realisation of roughness and noise; each has its own random stream.
     progress
         Called with a stage, the steps done and the steps in all.
 
     Raises
     ------
     ScenarioError
-        If nothing at all is received, or chains of ``max_bounces`` surfaces are out of reach.
+        If nothing is received, or paths of ``max_bounces`` bounces are too many to compute.
     """
     station, frequencies = scenario.base_station, scenario.radio.frequencies
     flaws = scenario.impairments
-    # What the estimator is told is where the elements should stand.
+    # The measurement reports nominal positions, without the jitter.
     elements = station.element_positions
     advance = _counter("echo", len(elements), progress)
     array: Ports | None = None

@@ -1,22 +1,22 @@
-r"""What facets reflect: Fresnel coefficients at the half angle, between polarized antennas.
+r"""Reflection of facets: Fresnel coefficients at half the bistatic angle, polarized antennas.
 
-Seen from both of its ends, a facet acts as the mirror that would lead from one to the other:
-its angle of incidence is half the angle between the legs, :math:`\cos\vartheta =
-|\hat u_t + \hat u_r| / 2` with unit vectors from the facet to the antennas. On the mirror's
-lobe this is the angle of incidence itself; elsewhere it is the one choice that depends on
-both legs alike, so that the link stays reciprocal. An echo to where it came from is thus
-reflected as at normal incidence, by the little mirrors that face the antenna.
+A facet reflects like the mirror that would specularly connect its two antennas: the angle of
+incidence is half the angle between the legs, :math:`\cos\vartheta = |\hat u_t + \hat u_r| / 2`
+with unit vectors from the facet to the antennas. In the specular direction this is the true
+angle of incidence; elsewhere it is symmetric in both legs, so that the link stays reciprocal. A
+monostatic echo is thus reflected as at normal incidence.
 
-In two dimensions the electric field is along z, across the plane of incidence (TE), or the magnetic
-one is (TM). In three, the antennas' fields :math:`\hat e` are split at that mirror,
+In two dimensions the electric field is along z, perpendicular to the plane of incidence (TE), or
+the magnetic field is (TM). In three, the antennas' fields :math:`\hat e` are decomposed at that
+mirror,
 
 .. math:: \Gamma = (\hat e_r \cdot \hat s)(\hat s \cdot \hat e_t)\, \Gamma_{TE}
                  + (\hat e_r \cdot \hat p_r)(\hat p_t \cdot \hat e_t)\, \Gamma_{TM}
 
-with :math:`\hat s` across both legs and :math:`\hat p = \hat k \times \hat s`. The shares'
-difference, what a conductor reflects, is :math:`2 (\hat m \cdot \hat e_t)(\hat m \cdot \hat e_r)
-- \hat e_t \cdot \hat e_r` with the mirror's normal :math:`\hat m`: smooth also where the legs are
-one, and the shares themselves do not matter.
+with :math:`\hat s` perpendicular to both legs and :math:`\hat p = \hat k \times \hat s`. For a
+conductor :math:`\Gamma` is the difference of the two shares, :math:`2 (\hat m \cdot \hat e_t)
+(\hat m \cdot \hat e_r) - \hat e_t \cdot \hat e_r` with the mirror's normal :math:`\hat m`: this is
+continuous also in the monostatic case, where :math:`\hat s` is undefined.
 """
 
 from collections.abc import Callable
@@ -32,23 +32,25 @@ from simulator.numerics.nufft_sum import ACCURACY, barycentric_basis, chebyshev_
 from simulator.numerics.vectors import Vector, at_least, cross, dot
 
 NODE_COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192)
-"""Frequencies that a coefficient may be sampled at; the fewest that do are taken."""
+"""Allowed numbers of sampling frequencies of a coefficient; the smallest sufficient one is used."""
 
 COARSEST = 1e-4
-"""Error that is put up with at the most nodes: a table's kinks converge slowly. [-]"""
+"""Error accepted at the largest number of nodes: interpolation of tabulated permittivity, which
+has kinks, converges slowly. [-]"""
 
 STEEP = 0.1
-"""Cosine of incidence down to which a slab has to be followed: 84°. [-]"""
+"""Smallest cosine of incidence at which a slab's ripple must be interpolated exactly: 84°. [-]"""
 
 ANGLE_CLASSES = (0.02, 0.05, STEEP, 0.2, 0.35, 0.5, 0.7, 0.85)
-"""Most grazing cosines that links are sorted by, each with its number of nodes. [-]"""
+"""Lower bounds of the classes of cosines into which links are sorted; each class has its own number
+of nodes. [-]"""
 
 LEAST_TURN = 1e-12
-"""Squared sine between the legs below which they are one: TE and TM are then the same. [-]"""
+"""Squared sine between the legs below which they count as equal: TE and TM then agree. [-]"""
 
 
 class Legs(NamedTuple):
-    """Unit vectors from facets to both antennas, and their fields' vectors, by axis."""
+    """Unit vectors from facets to both antennas, and the antennas' field vectors, by axis."""
 
     transmit: Vector
     receive: Vector
@@ -57,7 +59,7 @@ class Legs(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Share of a link that each polarization carries, with its sign."""
+    """Signed weights of the TE and TM coefficients in a link."""
 
     te: Any
     tm: Any
@@ -72,7 +74,7 @@ def half_angle_cosine(
 
 
 def mirror_shares(legs: Legs) -> Shares:
-    """Split links at the mirror between their legs. [-].
+    """Decompose links into TE and TM at the mirror that connects their legs. [-].
 
     For arrays of NumPy and Dr.Jit alike.
     """
@@ -83,7 +85,7 @@ def mirror_shares(legs: Legs) -> Shares:
 
 
 def conductor_mirror(legs: Legs) -> Any:
-    """Reflect links at the conducting mirror between their legs. [-]."""
+    """Return the reflection of links by the conducting mirror that connects their legs. [-]."""
     squared = at_least(1.0 + dot(legs.transmit, legs.receive), LEAST_TURN)  # half of |q|²
     product = dot(legs.receive, legs.sent) * dot(legs.transmit, legs.received)
     return product / squared - dot(legs.sent, legs.received)
@@ -103,15 +105,16 @@ def facet_coefficients(
     Parameters
     ----------
     material
-        What the facets are made of.
+        Of the facets.
     transmit, receive
         Unit vectors from the facets to the antennas.
     frequencies
         Any grid. [Hz]
     fields
-        Vectors of the fields of both antennas there; None in two dimensions.
+        Field vectors of both antennas at the facets; None in two dimensions.
     polarization
-        Of the antennas, in two dimensions: the electric field is along z, or the magnetic one.
+        Of the antennas, in two dimensions. Vertical: the electric field is along z; horizontal:
+        the magnetic field is.
     """
     if fields is None:
         if isinstance(material, Conductor):
@@ -129,7 +132,7 @@ def facet_coefficients(
 def over_angles(
     material: Material, frequencies: Float[np.ndarray, " nodes"], cosines: Float[np.ndarray, " n"]
 ) -> Coefficients:
-    """Reflection coefficients [nodes, n], interpolated between angles where those are many."""
+    """Reflection coefficients [nodes, n], interpolated over angle if n is large."""
     low, high = float(cosines.min()), float(cosines.max())
     for count in NODE_COUNTS:
         if 4 * count >= len(cosines):
@@ -156,7 +159,7 @@ def echo_coefficient(
     *,
     polarization: Polarization2D = "vertical",
 ) -> Complex[np.ndarray, " freqs"]:
-    """Reflection coefficient for an echo to where it came from: at normal incidence. [-]."""
+    """Reflection coefficient of a monostatic echo: that at normal incidence. [-]."""
     both = reflection(material, frequencies, np.ones(1))
     coefficient: np.ndarray = (both.te if polarization == "vertical" else both.tm)[0]
     return coefficient
@@ -172,13 +175,14 @@ def reflection_nodes(
 ) -> int:
     """Count the Chebyshev nodes over a band that interpolate a material's coefficients.
 
-    They are tried out at all angles: a slab ripples with the delay of its inner echoes, the
-    faster the thicker it is and the less it absorbs, and more sharply at grazing incidence.
+    The interpolation error is tested at all angles: a slab's coefficient ripples over frequency
+    with the delay of its internal reflections, faster for thicker slabs and lower loss, and more
+    sharply at grazing incidence.
 
     Parameters
     ----------
     material
-        What reflects.
+        Of the surface.
     start, stop
         The band. [Hz]
     lowest
@@ -188,13 +192,13 @@ def reflection_nodes(
 
     Returns
     -------
-    The fewest whose error is below the accuracy; for angles more
-    grazing than :data:`STEEP` no more than the last of :data:`NODE_COUNTS`, whatever the error.
+    The smallest number whose error is below the accuracy; for angles more grazing than
+    :data:`STEEP` at most the last of :data:`NODE_COUNTS`, whatever the error.
 
     Raises
     ------
     MaterialError
-        If a slab ripples too fast to be followed.
+        If a slab's coefficient ripples too fast over frequency to be interpolated.
     """
     if isinstance(material, Conductor):
         return 1
@@ -220,12 +224,12 @@ def node_count(
     Parameters
     ----------
     coefficients
-        Of frequencies and cosines of incidence.
+        As a function of frequencies and cosines of incidence.
     start, stop, lowest, accuracy
-        As for :func:`reflection_nodes`, which tells what is raised.
+        As for :func:`reflection_nodes`; so are the errors raised.
     """
     cosines = np.linspace(lowest, 1.0, 15)
-    # Five points between two nodes; none of them is one.
+    # Test points: five between neighbouring nodes, none at a node.
     points = np.linspace(start, stop, 5 * NODE_COUNTS[-1] + 1)
     exact = np.concatenate(coefficients(points, cosines))
     worst = np.inf
@@ -245,6 +249,6 @@ def node_count(
 
 
 def angle_class(cosines: Float[np.ndarray, " n"]) -> float:
-    """Return the largest of a few cosines that none of these is below (or the smallest). [-]."""
+    """Return the largest of :data:`ANGLE_CLASSES` below all these cosines, or its smallest. [-]."""
     lowest = float(cosines.min(initial=1.0))
     return max((limit for limit in ANGLE_CLASSES if limit <= lowest), default=ANGLE_CLASSES[0])

@@ -1,4 +1,4 @@
-"""What a slab inserts between many facets at many frequencies, interpolated over the angle."""
+"""Tabulated transmission of a slab over angle and frequency, for links to many facets."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ from simulator.materials.slab_insertion import Crossing, bent_rays, inserted
 
 @dataclass(frozen=True, kw_only=True)
 class InsertionTable:
-    """A slab in the way, and its coefficients over frequency and angle."""
+    """A slab crossed by a link, and its coefficients over frequency and angle."""
 
     crossing: Crossing
-    frequency: float  # whose refractive index bends rays [Hz]
+    frequency: float  # at which the refractive index that bends rays is taken [Hz]
     table: ReflectionTable
 
     @classmethod
@@ -41,7 +41,7 @@ class InsertionTable:
     ) -> Float[np.ndarray, "*n"]:
         r"""Return the optical path of bent rays beyond that of straight ones, :math:`s^2/2L`. [m].
 
-        The table is that of the straight ray's angle, where the phase is stationary but for this.
+        The table holds coefficients at the straight ray's angle; this is the phase it leaves out.
         """
         rays = np.concatenate([directions, np.zeros((*directions.shape[:-1], 1))], axis=-1)
         bent = bent_rays((self.crossing,), rays.reshape(-1, 3), lengths.ravel(), self.frequency)

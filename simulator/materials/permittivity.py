@@ -84,7 +84,7 @@ class TabulatedPermittivity:
     values: Complex[np.ndarray, " entries"]  # ε' - jε'' [-]
 
     def __post_init__(self) -> None:
-        """Refuse a table that is no function of frequency or no passive material."""
+        """Refuse a table whose frequencies do not rise or whose material is not passive."""
         if problem := table_problem(self.frequencies, self.values):
             raise MaterialError(f"{self.name}: {problem}")
 
@@ -127,8 +127,8 @@ ITU_ROWS: Mapping[str, tuple[tuple[float, float, float, float, float], ...]] = {
     "marble": ((1, 60, 7.074, 0.0055, 0.9262), (110, 330, 7.94, 0.0001, 1.7330)),
     "floorboard": ((50, 100, 3.66, 0.0044, 1.3515), (100, 400, 3.1575, 0.001675, 1.32775)),
 }
-"""Rows of Table 3 of ITU-R P.2040-4: lowest and highest frequency [GHz], ε', c, d. Where two
-cover a band the first counts."""
+"""Rows of Table 3 of ITU-R P.2040-4: lowest and highest frequency [GHz], ε', c, d. If two cover a
+band, the first is used."""
 
 
 def itu_permittivity(name: str, frequencies: Float[np.ndarray, " freqs"]) -> PowerLawPermittivity:
@@ -179,7 +179,7 @@ def conductivity(
 ) -> Float[np.ndarray, " freqs"]:
     r"""Return the conductivity in S/m, :math:`2 \pi f \varepsilon_0 \varepsilon''`.
 
-    With the real part it is what a radio material of Sionna RT is made of.
+    Radio materials of Sionna RT are described by it and the real part of the permittivity.
     """
     sigma: np.ndarray = -2.0 * np.pi * frequencies * epsilon_0 * permittivity.imag
     return sigma

@@ -13,16 +13,16 @@ TABLE_ACCURACY = 1e-5
 """Largest error of a coefficient half way between two angles of the table. [-]"""
 
 MOST_ANGLES = 2**15
-"""Most angles of a table: within a degree of grazing, the last waves of a slab that hardly
-absorbs are smoothed. [-]"""
+"""Most angles of a table. Within a degree of grazing, the fastest ripples of a slab of low loss
+are then not resolved. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Angles:
-    """Where cosines of incidence lie in a table: between which two of its angles."""
+    """Positions of cosines in a table: index of the angle below, and weight of the one above."""
 
     below: Int[np.ndarray, "*n"]
-    share: Float32[np.ndarray, "*n"]  # of the angle above
+    share: Float32[np.ndarray, "*n"]  # weight of the angle above
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class ReflectionTable:
         return Angles(below=below, share=(steps - below).astype(np.float32))
 
     def at(self, angles: Angles, frequency: int | slice) -> Complex64[np.ndarray, "..."]:
-        """Interpolate at one of the frequencies [*n], or at some [freqs, *n]; n may be 1."""
+        """Interpolate at one frequency (shape [*n]) or several ([freqs, *n]); n may be 1."""
         row = self.samples[frequency]
         if row.shape[-1] == 1:
             return row.reshape(*row.shape[:-1], *(1 for _ in angles.below.shape))
@@ -57,11 +57,11 @@ def reflection_table(
     Parameters
     ----------
     material
-        What reflects.
+        Of the surface.
     frequencies
         Any grid. [Hz]
     polarization
-        The electric field is along z, or the magnetic one.
+        Vertical: the electric field is along z; horizontal: the magnetic field is.
 
     Returns
     -------
@@ -87,12 +87,12 @@ def tabulated(
     ],
     frequencies: Float[np.ndarray, " freqs"],
 ) -> ReflectionTable:
-    """Tabulate a coefficient of frequency and cosine at the fewest angles that do.
+    """Tabulate a coefficient at the fewest angles whose error is below :data:`TABLE_ACCURACY`.
 
     Parameters
     ----------
     exact_at
-        The coefficient.
+        The coefficient as a function of frequency and cosine of incidence.
     frequencies
         Any grid. [Hz]
     """

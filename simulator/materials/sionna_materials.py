@@ -46,7 +46,7 @@ OPAQUE_LOSS = math.log(1e3)
 
 
 class SionnaSlab(NamedTuple):
-    """What a radio material of Sionna RT is made of, at one frequency."""
+    """Parameters of a radio material of Sionna RT at one frequency."""
 
     relative_permittivity: float  # [-]
     conductivity: float  # [S/m]
@@ -92,21 +92,21 @@ def sionna_slab(
     frequency
         [Hz]
     rms_height
-        Its roughness; 0 also where the roughness is in the geometry itself. [m]
+        Its roughness; 0 also if the geometry itself is rough. [m]
     angle
-        Where the roughness is turned into a scattering coefficient. [rad]
+        Angle of incidence at which the scattering coefficient is computed. [rad]
 
     Raises
     ------
     MaterialError
-        If the permittivity is not known at the frequency, or a half space has no loss that a
-        layer could absorb the wave by.
+        If the permittivity is not known at the frequency, or a half space is lossless, so that
+        no absorbing layer is equivalent to it.
     """
     scattering = scattering_coefficient(rms_height, frequency, angle=angle)
     wavelength = speed_of_light / frequency
     match material:
         case Conductor():
-            # No thickness matters: the wave ends within a micrometre.
+            # Any thickness will do: the skin depth is below a micrometre.
             return SionnaSlab(1.0, CONDUCTIVITY, 1e-3, scattering)
         case Absorber():
             loss = np.array([1.0 - 1j * ABSORBER_LOSS])
@@ -160,16 +160,16 @@ def radio_material(
 
 
 class _FollowingMaterial(rt.RadioMaterial):  # type: ignore[misc]  # Sionna RT is untyped
-    """A radio material all of whose parameters follow the frequency.
+    """A radio material all of whose parameters are updated with the scene's frequency.
 
-    Sionna's callback reaches permittivity and conductivity only; and a callback that holds the
-    material it changes would keep both alive for ever.
+    Sionna's own callback sets permittivity and conductivity only; and a callback that refers to
+    its material would be a reference cycle, never freed.
     """
 
     slab: Callable[[float], SionnaSlab] | None = None
 
     def frequency_update(self) -> None:
-        """Take over the scene's frequency; called by Sionna when it is set."""
+        """Update all parameters to the scene's frequency; called by Sionna when it is set."""
         scene: Any = self.scene
         if scene is None or self.slab is None:
             return

@@ -1,23 +1,23 @@
-r"""What slabs of a dielectric do to a wave between two points: loss, phase, delay and bending.
+r"""Effect of dielectric slabs on a wave between two points: loss, phase, delay and refraction.
 
 Between points a distance :math:`L` apart a wave is a spectrum of plane waves, each of which a slab
 of thickness :math:`d` multiplies by :math:`T(\theta)\,e^{jkd\cos\theta}`: its coefficient of
-transmission (Airy's sum, ITU-R P.2040-4), over the air that it takes the place of. The optical path
+transmission (Airy's sum, ITU-R P.2040-4), over that of the air in its place. The optical path
 that it adds, :math:`P(\theta) = d\,(\sqrt{n^2 - \sin^2\theta} - \cos\theta)`, moves the point of
 stationary phase off the straight line,
 
 .. math:: \theta^* = \theta + s / L, \qquad s = P'(\theta) =
           d \sin\theta \left(1 - \frac{\cos\theta}{\sqrt{n^2 - \sin^2\theta}}\right)
 
-with the sideways shift :math:`s` of a ray through the slab (Snell). At that angle the slab's factor
-is taken, the bent ray gains a phase of :math:`kL (1 - \cos(\theta^* - \theta))`, and the wave
-front, curved as from a nearer source, is stronger by
+with the lateral shift :math:`s` of a ray through the slab (Snell). The slab's factor is taken at
+that angle, the refracted ray gains a phase of :math:`kL (1 - \cos(\theta^* - \theta))`, and the
+wavefront, curved as from a nearer source, is stronger by
 
 .. math:: \left[(1 - P''/L)(1 - P'/(L \tan\theta))\right]^{-1/2}.
 
-What is left out is of the order :math:`(d/L)^2`, and for the waves that run to and fro within the
-slab their further shift: a phase of :math:`k(2s)^2/2L` for those that do so once. Several slabs
-add their shifts, as vectors, and multiply their factors.
+Left out are terms of the order :math:`(d/L)^2`, and the further lateral shift of waves reflected
+within the slab: a phase of :math:`k(2s)^2/2L` after one internal round trip. The shifts of several
+slabs add as vectors, and their factors multiply.
 
 References
 ----------
@@ -36,29 +36,29 @@ from simulator.materials.facet_reflection import STEEP, node_count
 from simulator.materials.fresnel_slab import Coefficients, Dielectric, transmission
 
 CLOSEST = 0.25
-"""Least share of the distance to the apparent source in the true one: antennas nearer to a slab
-than its thickness are no rays' matter any more. [-]"""
+"""Least ratio of the distance to the apparent source to the true distance: for antennas nearer to a
+slab than about its thickness the ray approximation fails. [-]"""
 
 LEAST_LEVEL = 1e-3
-"""Product of the slabs' transmission that is left out: -60 dB of free space. [-]"""
+"""Product of the slabs' transmission below which a path is left out: -60 dB of free space. [-]"""
 
 
 PARALLEL = 1e-9
-"""Sine of the angle of incidence below which it is 0: what is left across is rounding. [-]"""
+"""Sine of the angle of incidence below which incidence counts as normal: less is rounding. [-]"""
 
 
 class Crossing(NamedTuple):
-    """A slab in the way."""
+    """A slab crossed by a ray."""
 
     material: Dielectric
     normal: Float[np.ndarray, " 3"]  # unit vector, to either side
 
 
 class Bent(NamedTuple):
-    """Rays through slabs, over the straight lines between their ends."""
+    """Refracted rays through slabs, relative to the straight lines between their ends."""
 
     directions: Float[np.ndarray, "rays 3"]  # outside of the slabs, unit vectors
-    saved: Float[np.ndarray, " rays"]  # optical path in the air less than the straight line's [m]
+    saved: Float[np.ndarray, " rays"]  # straight line's optical path less the ray's in air [m]
     within: Float[np.ndarray, " rays"]  # gain of the field by curvature in the plane of incidence
     across: Float[np.ndarray, " rays"]  # and across it [-]
 
@@ -66,7 +66,7 @@ class Bent(NamedTuple):
 def inserted(
     material: Dielectric, frequencies: Float[np.ndarray, " freqs"], cosines: Float[np.ndarray, "*n"]
 ) -> Coefficients:
-    """Coefficients of transmission over those of the air in the slab's place. [-].
+    """Coefficients of transmission over those of air in the slab's place. [-].
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def bent_rays(
     lengths: Float[np.ndarray, " rays"],
     frequency: float,
 ) -> Bent:
-    """Bend rays as slabs between their ends do.
+    """Refract rays at slabs between their ends.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def bent_rays(
     directions, lengths
         Of the straight lines; unit vectors, and [m].
     frequency
-        Whose refractive index is taken. [Hz]
+        At which the refractive index is taken. [Hz]
     """
     tilt = np.zeros_like(directions)
     within, across = np.ones(len(directions)), np.ones(len(directions))
@@ -160,7 +160,7 @@ def transported_through(
     frequencies: Float[np.ndarray, " freqs"],
     field: Complex[np.ndarray, "rays freqs 3"],
 ) -> Complex[np.ndarray, "rays freqs 3"]:
-    """Take a vector field through slabs, in three dimensions.
+    """Transmit a vector field through slabs, in three dimensions.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def transported_through(
     frequencies
         Any grid. [Hz]
     field
-        What would be there without them.
+        The field without the slabs.
     """
     bent, common = _common(crossings, directions, lengths, frequencies, cylindrical=False)
     for both, normal in _in_turn(crossings, bent, frequencies):
@@ -186,9 +186,10 @@ def along_field(
     frequencies: Float[np.ndarray, " freqs"],
     field: Float[np.ndarray, "rays 3"],
 ) -> Complex[np.ndarray, "rays freqs"]:
-    """Return the field behind slabs along that without them, over it, in three dimensions. [-].
+    """Return the co-polar transmission of slabs in three dimensions. [-].
 
-    What a slab turns out of the field's direction is left out.
+    The component of the field behind the slabs along the field without them, over the latter's
+    amplitude; the cross-polar component is left out.
 
     Parameters
     ----------
@@ -209,7 +210,7 @@ def along_field(
 def across_plane(
     directions: Float[np.ndarray, "rays 3"], normal: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, "rays 3"]:
-    """Return unit vectors across the plane of incidence; none at normal incidence: TE is TM."""
+    """Return unit vectors across the plane of incidence; 0 at normal incidence, where TE is TM."""
     across = np.cross(directions, normal)
     size = np.sqrt(np.einsum("rx,rx->r", across, across))[:, None]
     return np.asarray(np.divide(across, size, out=np.zeros_like(across), where=size > PARALLEL))
@@ -218,7 +219,7 @@ def across_plane(
 def _in_turn(
     crossings: Sequence[Crossing], bent: Bent, frequencies: Float[np.ndarray, " freqs"]
 ) -> Iterator[tuple[Coefficients, Float[np.ndarray, " 3"]]]:
-    """Yield what each slab inserts into bent rays [rays, freqs], and its normal."""
+    """Yield each slab's transmission of the refracted rays [rays, freqs], and its normal."""
     for material, normal in crossings:
         cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
         yield inserted(material, frequencies, cosines), normal
@@ -240,9 +241,9 @@ def _common(
 
 
 def passage_level(crossings: Sequence[Crossing], frequencies: Float[np.ndarray, " freqs"]) -> float:
-    """Bound what slabs let through, over the band and all angles. [-].
+    """Return the largest transmission of slabs over the band and all angles up to 84°. [-].
 
-    Angles up to 84° are tried; beyond, waves are reflected.
+    At more grazing incidence most of the wave is reflected.
     """
     some = frequencies[:: max(1, frequencies.size // 32)]
     cosines = np.linspace(STEEP, 1.0, 19)
@@ -254,7 +255,7 @@ def passage_level(crossings: Sequence[Crossing], frequencies: Float[np.ndarray, 
 
 
 def passage_nodes(crossings: Sequence[Crossing], start: float, stop: float) -> int:
-    """Count the Chebyshev nodes over a band that interpolate what slabs insert.
+    """Count the Chebyshev nodes over a band that interpolate the slabs' transmission.
 
     Parameters
     ----------
@@ -266,7 +267,7 @@ def passage_nodes(crossings: Sequence[Crossing], start: float, stop: float) -> i
     Raises
     ------
     MaterialError
-        If one ripples too fast to be followed.
+        If a slab's transmission ripples too fast over frequency to be interpolated.
     """
     counts = [node_count(partial(inserted, one.material), start, stop) for one in crossings]
     return 1 + sum(count - 1 for count in counts)

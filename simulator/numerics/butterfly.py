@@ -1,20 +1,20 @@
 r"""Butterfly sum: links between the facets of two faces, block by block, at low rank.
 
-Between a block of facets around :math:`w_0` and one around :math:`q_0` the phase is split,
+Between a block of facets around :math:`w_0` and one around :math:`q_0` the distance is decomposed,
 
 .. math:: r(w, q) = r(w, q_0) + \bigl(r(w_0, q) - r(w_0, q_0)\bigr) + \rho(w, q)
 
-The first two parts depend on one end each. The mixed rest :math:`\rho` grows with the product of
-both sizes over the distance only, so that :math:`e^{-jk\rho}`, the spreading and the directions
-are interpolated from a few Chebyshev points of either block's bounding box. Facets send to the
-points of their block (the transposed interpolation), points to points, points to facets: in
-place of n · m links between facets there are a few for each facet. Roughness is kept whole: the
-parts that depend on one end are taken where the facets really are.
+The first two terms depend on one end each. The mixed term :math:`\rho` grows only with the product
+of both sizes over the distance, so that :math:`e^{-jk\rho}`, the spreading and the directions are
+interpolated from a few Chebyshev points of either block's bounding box. Facets are summed into the
+points of their block (the transposed interpolation), points into points, and points interpolated to
+facets: in place of n · m links between facets there are a few for each facet. Roughness is exact:
+the terms that depend on one end are evaluated at the facets' true positions.
 
 This is one level of a butterfly scheme (E. Candès, L. Demanet, L. Ying, "A fast butterfly
 algorithm for the computation of Fourier integral operators", Multiscale Model. Simul. 7, 2009,
-doi:10.1137/080734339). Blocks that are close, or see each other in part only, are left to plain
-summation.
+doi:10.1137/080734339). Links between blocks that are close, or see each other only in part, are
+summed one by one.
 """
 
 from collections.abc import Sequence
@@ -28,30 +28,31 @@ from scipy.special import jv
 from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
 
 LINK_ACCURACY = 1e-3
-"""Bound of the interpolation's error, over the contribution of each facet; errors of either sign
-cancel, a hundredth of it was left. Physical optics itself is good to some 1e-2. [-]"""
+"""Bound of the interpolation error relative to each facet's contribution; in the sum, errors cancel
+to a hundredth of it. The error of physical optics itself is some 1e-2. [-]"""
 
 PHASE_OF_BLOCKS = 6.0
-"""The mixed phase of two blocks, head-on, that their size aims at. [rad]"""
+"""Mixed phase of two blocks that face each other, from which their size is chosen. [rad]"""
 
 NEAREST = 3.0
-"""Distance of two blocks, over half the size of the larger, below which links are summed. [-]"""
+"""Distance of two blocks, over half the size of the larger, below which links are summed singly.
+[-]"""
 
 AMPLITUDE_POINTS = 2
-"""Points that spreading and directions ask for beyond those of the phase; with a distance of
-:data:`NEAREST` and more they err by less than :data:`LINK_ACCURACY`."""
+"""Interpolation points for spreading and directions beyond those for the phase; at a distance of
+:data:`NEAREST` and more their error is below :data:`LINK_ACCURACY`. [-]"""
 
 FLAT = 0.05
-"""Half a box's size across, over that along, up to which spreading and directions are taken not to
-vary across it: they vary by the size over the distance, a 60th at :data:`NEAREST`. [-]"""
+"""Ratio of a box's sides up to which spreading and directions are taken as constant across it: they
+vary by the half side over the distance, a 60th at :data:`NEAREST`. [-]"""
 
 LARGEST_RANK = 0.7
-"""Points of a block, over its facets, beyond which nothing would be saved. [-]"""
+"""Ratio of a block's points to its facets beyond which interpolation saves no time. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Neighbouring facets, with the points that stand for them."""
+    """Neighbouring facets, with the interpolation points that represent them."""
 
     members: Int[np.ndarray, " facets"]
     centre: Float[np.ndarray, " 2"]  # [m]
@@ -61,7 +62,7 @@ class Block:
 
 @dataclass(frozen=True, kw_only=True)
 class BlockPair:
-    """Two blocks that see each other as a whole, or not at all."""
+    """Two blocks, each facet of which sees the whole other block or nothing of it."""
 
     sender: int  # index of the wall's block
     receiver: int  # index of the target's block
@@ -76,12 +77,12 @@ class BlockPair:
 
 @dataclass(frozen=True, kw_only=True)
 class LinkPlan:
-    """How the links between two faces are summed; for all frequencies up to the highest."""
+    """Division of the links between two faces into block pairs, up to a highest frequency."""
 
     senders: tuple[Block, ...]
     receivers: tuple[Block, ...]
     pairs: tuple[BlockPair, ...]
-    left: Bool[np.ndarray, "wall target"]  # links that are to be summed one by one
+    left: Bool[np.ndarray, "wall target"]  # links to be summed one by one
     by_sender: dict[int, list[BlockPair]] = field(default_factory=dict)
     by_receiver: dict[int, list[BlockPair]] = field(default_factory=dict)
 
@@ -92,12 +93,12 @@ def plan_links(
     seen: Bool[np.ndarray, "wall target"],
     highest: float,
 ) -> LinkPlan:
-    """Divide two faces into blocks, and choose those that are linked by few points.
+    """Divide two faces into blocks, and select block pairs of low rank.
 
     Parameters
     ----------
     wall, target
-        Centres of the facets that send and that receive. [m]
+        Centres of the radiating and of the receiving facets. [m]
     seen
         Which of them see each other.
     highest
@@ -145,23 +146,23 @@ def sum_planned(
     targets: int,
     frequency: float,
 ) -> Complex64[np.ndarray, "3 ports target"]:
-    r"""Sum what blocks send to blocks at one frequency.
+    r"""Sum the fields that blocks radiate to blocks at one frequency.
 
     Parameters
     ----------
     plan
         After :func:`plan_links`.
     sources
-        A monopole :math:`s` and a dipole :math:`\mathbf d` at each facet that sends; it sends
+        A monopole :math:`s` and a dipole :math:`\mathbf d` at each radiating facet, with the field
         :math:`(s + \mathbf d \cdot \hat u)\, e^{-jkr} / \sqrt r` in a direction :math:`\hat u`.
     targets
-        Number of facets that receive.
+        Number of receiving facets.
     frequency
         [Hz].
 
     Returns
     -------
-    The field, and the field times :math:`-\hat u`, the direction that it comes from.
+    The field, and the field times :math:`-\hat u`, the direction of arrival.
     """
     ports = sources.shape[1]
     received = np.zeros((3, ports, targets), np.complex64)
@@ -197,7 +198,7 @@ def sum_planned(
 
 
 def _point_links(pair: BlockPair, per_metre: float) -> Complex64[np.ndarray, "from to"]:
-    """Links of the points of two blocks: monopole and dipole to field and its directions."""
+    """Return the matrix of two blocks' points: monopole and dipole to field and directions."""
     link = pair.spreading * phasor(-per_metre * pair.mixed)
     ones = np.ones_like(link.real)[None]
     sent = np.concatenate([ones, pair.directions])
@@ -207,7 +208,7 @@ def _point_links(pair: BlockPair, per_metre: float) -> Complex64[np.ndarray, "fr
 
 
 def phasor(turns: Float[np.ndarray, "*n"]) -> Complex64[np.ndarray, "*n"]:
-    """Return exp(j2π·turns); whole turns, of which there are thousands, go first."""
+    """Return exp(j2π·turns); whole turns (thousands) are removed first, for precision."""
     angle = np.asarray((turns - np.rint(turns)) * (2 * np.pi), dtype=np.float32)
     phasor = np.empty(angle.shape, np.complex64)
     np.cos(angle, out=phasor.real)
@@ -268,7 +269,7 @@ class _Box:
 
 
 def _bisected(points: Float[np.ndarray, "n 2"], size: float) -> list[Int[np.ndarray, " part"]]:
-    """Halve a set of points across its longer side until no part is longer than a size."""
+    """Bisect a set of points across its longer side until no part is longer than a size."""
     done: list[np.ndarray] = []
     parts = [np.arange(len(points))]
     while parts:
@@ -299,7 +300,7 @@ def _point_counts(
     side: int,
     wavenumber: float,
 ) -> list[tuple[int, int]]:
-    """Points along both axes of each box that carry it to all others it is linked with."""
+    """Return the points along both axes of each box that suffice for all its linked boxes."""
     counts = []
     for index, box in enumerate(boxes):
         phases = np.zeros(2)
@@ -314,7 +315,7 @@ def _point_counts(
             middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
             turned = np.abs((towards - middle) @ box.axes.T).max(axis=(0, 1))
             phases = np.maximum(phases, wavenumber * box.half * turned)
-        # Across a nearly flat box spreading and directions do not vary.
+        # Across a nearly flat box spreading and directions are constant.
         more = AMPLITUDE_POINTS * (box.half > FLAT * box.half.max())
         first, second = (
             _nodes_for(float(phase)) + int(extra) for phase, extra in zip(phases, more, strict=True)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 ACCURACY = 1e-6
-"""Relative error asked of the transform and of the interpolation over frequency. [-]."""
+"""Required relative error of the transform and of the interpolation over frequency. [-]"""
 
 
 def chebyshev_nodes(start: float, stop: float, count: int) -> Float[np.ndarray, " nodes"]:
@@ -92,7 +92,7 @@ class FrequencySum:
         """Sum ``amplitudes`` delayed by ``delays`` [s]; error about :data:`ACCURACY`."""
         if delays.size == 0:
             return np.zeros(self.frequencies.size, dtype=np.complex128)
-        # Whole turns are taken out in float64: there are thousands of them.
+        # Whole turns (thousands) are removed in float64, for precision.
         turns = self.centre * delays
         carrier = np.exp(-2j * np.pi * (turns - np.round(turns)))
         steps = self.step * delays
@@ -112,7 +112,7 @@ class FrequencySum:
     def transform(
         self, phases: Float[np.ndarray, " sources"], terms: Complex[np.ndarray, "nodes sources"]
     ) -> Complex[np.ndarray, " freqs"]:
-        """Sum terms that turn by a phase from one frequency to the next.
+        """Sum terms whose phase advances by a constant from one frequency to the next.
 
         Parameters
         ----------
@@ -122,7 +122,7 @@ class FrequencySum:
             Amplitudes at the nodes, delayed as at :attr:`centre`.
         """
         count = self.frequencies.size
-        if not hasattr(self._local, "plan"):  # a plan serves one thread
+        if not hasattr(self._local, "plan"):  # plans are not thread-safe: one for each thread
             self._local.plan = finufft.Plan(
                 1,
                 (count,),

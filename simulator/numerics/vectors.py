@@ -39,7 +39,7 @@ def square_root(value: Any) -> Any:
 
 
 def at_least(value: Any, least: float) -> Any:
-    """Raise what is below a limit to the limit."""
+    """Maximum of a value and a limit."""
     return np.maximum(value, least) if _of_numpy(value) else dr.maximum(value, least)
 
 

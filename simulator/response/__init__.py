@@ -1,4 +1,4 @@
-"""What a base station receives of a scene: echo, uplinks, bistatic and multistatic responses.
+"""Received signals of a scene: echo, uplinks, bistatic and multistatic responses.
 
 Each function turns a scene into complex samples over antennas and frequencies, without noise.
 """

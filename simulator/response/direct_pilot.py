@@ -1,4 +1,4 @@
-"""A user's pilot on the straight way to the array: in plain sight, or through slabs."""
+"""A user's pilot on the direct path to the array: in line of sight, or through slabs."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -13,18 +13,18 @@ from simulator.visibility.line_of_sight import in_line_of_sight
 
 
 def direct_pilot(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
-    """Simulate what arrives of a user's pilot on the straight way.
+    """Simulate a user's pilot on the direct path.
 
     Parameters
     ----------
     scene
         The frozen scene.
     user
-        Transmits.
+        The transmitting user.
 
     Returns
     -------
-    S-parameter at each element (cylindrical waves: field); 0 where something opaque is between.
+    S-parameter at each element (cylindrical waves: field); 0 behind opaque surfaces. [-]
     """
     scenario, station = scene.scenario, scene.scenario.base_station
     elements, frequencies = scene.elements, scenario.radio.frequencies
@@ -49,7 +49,7 @@ def _inserted(
     directions: Float[np.ndarray, "elements 3"],
     distances: Float[np.ndarray, " elements"],
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Return what slabs and polarization leave of the field. [-]."""
+    """Return the factor of the slabs' transmission and of the polarizations. [-]."""
     scenario, frequencies = scene.scenario, scene.scenario.radio.frequencies
     sent, received = _fields(scene, user, directions)
     total = np.repeat(np.einsum("ex,ex->e", sent, received)[:, None] + 0j, frequencies.size, axis=1)
@@ -76,7 +76,7 @@ def _inserted(
 def _fields(
     scene: RadioScene, user: User, directions: Float[np.ndarray, "elements 3"]
 ) -> tuple[Float[np.ndarray, "elements 3"], Float[np.ndarray, "elements 3"]]:
-    """Return unit vectors of the user's field, and of what the array receives."""
+    """Return unit vectors of the user's field, and of the field that the array receives."""
     scenario, station = scene.scenario, scene.scenario.base_station
     if scenario.dimensions == 2:
         upright = np.tile([0.0, 0.0, 1.0], (len(directions), 1))

@@ -1,4 +1,4 @@
-"""The echo: each position transmits, and receives what the facets return, there or beside it."""
+"""The echo: each position transmits, and receives at the same or a neighbouring place."""
 
 from collections.abc import Callable
 
@@ -32,11 +32,11 @@ def simulate_echo(
     scene
         The frozen scene.
     array
-        Ports of the array; ``None`` if nothing scatters, or if antennas stand by themselves.
+        Ports of the array; ``None`` if nothing scatters, or if transmitters are separate.
     advance
-        Called for each position that is done.
+        Called after each position.
     over_several
-        Told how much is done of what comes over several surfaces.
+        Called with the progress of the part over several surfaces.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def simulate_echo(
 def _link_by_link(
     scene: RadioScene, facets: Facets, advance: Callable[[], None]
 ) -> Complex[np.ndarray, "positions freqs"]:
-    """Sum over one bounce between antennas that each look where they do."""
+    """Sum over one bounce between antennas that have aims of their own."""
     scenario, station = scene.scenario, scene.scenario.base_station
     senders = station.transmit_positions(scene.elements)
     senders = scene.elements if senders is None else senders

@@ -1,8 +1,8 @@
-"""The echo between antennas that stand by themselves, in three dimensions.
+"""The echo between separate transmitters and receivers (multistatic), in three dimensions.
 
-Plates are cut into tiles, so that the facets of a rough one never have to be in memory at once;
-what neither antenna's pattern illuminates is left out. A plate does not hide itself by its own
-roughness; rays are traced among the mean surfaces of everything else.
+Plates are divided into tiles, so that the facets of a rough one are never all in memory; tiles
+outside the product of the antennas' patterns are left out. A plate does not hide itself by its own
+roughness: rays are traced among the mean surfaces of all other objects.
 """
 
 import math
@@ -35,26 +35,26 @@ from simulator.scene.radio_scene import (
 )
 
 TILE_CELLS = 700
-"""Cells along each side of a tile: a million triangles, 200 MB with all that is made of them."""
+"""Cells along each side of a tile: a million triangles, 200 MB with derived arrays. [-]"""
 
 FAINTEST = 1e-3
-"""Product of both field patterns, over their peaks, below which a tile is left out: what it
-would add is 60 dB down, and the edge that it makes another 60 dB. [-]"""
+"""Product of both field patterns, relative to their peaks, below which a tile is left out: its
+contribution is at -60 dB, and that of the edge so created another 60 dB lower. [-]"""
 
 FEW_FREQUENCIES = 64
-"""Frequencies up to which summing each by itself is faster than a sum over the band. [-]"""
+"""Frequencies up to which a sum at each one is faster than a non-uniform FFT over the band. [-]"""
 
 MASKS_KEPT = 2
-"""Places from which it is remembered what is seen: the transmitter's and the last receiver's."""
+"""Antennas whose visibility masks are cached: the transmitter and the last receiver. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MultistaticScene:
-    """One realisation of a scenario whose antennas stand by themselves."""
+    """One realisation of a scenario with separate transmitters and receivers."""
 
-    radio: RadioScene  # its rays meet plates as their mean planes; it has no facets
+    radio: RadioScene  # its ray scene holds plates as mean planes; it has no facets
     materials: dict[str, Material]
-    shaped: tuple[Surface, ...]  # everything but plates, displaced
+    shaped: tuple[Surface, ...]  # all objects but plates, with their roughness
     seed: int
     sample: int
 
@@ -64,13 +64,13 @@ class MultistaticScene:
         return self.radio.scenario
 
     def around(self, name: str) -> list[Surface]:
-        """Everything but one object: plates as their mean planes, all else as it is."""
+        """All objects but one: plates as their mean planes, others with their roughness."""
         planes = [plane for plane in _mean_plates(self.scenario) if plane.name != name]
         return [*planes, *(surface for surface in self.shaped if surface.name != name)]
 
 
 def multistatic_scene(scenario: Scenario, *, seed: int, sample: int) -> MultistaticScene:
-    """Make a scenario ready, but for the facets of its plates.
+    """Prepare a scenario for simulation, except for the facets of its plates.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def multistatic_echo(
 
 @dataclass(frozen=True, kw_only=True)
 class _End:
-    """An antenna, as the kernel and as the rest of the simulator know it."""
+    """An antenna, in the representations of the kernel and of the rest of the simulator."""
 
     port: Port
     antenna: Antenna
@@ -146,7 +146,7 @@ class _Link:
         return self.transmit, self.receive
 
     def bound(self, part: "_Part") -> float:
-        """Largest product of both patterns over a part, over their peaks. [-]."""
+        """Upper bound of the patterns' product over a part, relative to their peaks. [-]."""
         if part.ball is None:
             return 1.0
         return math.prod(end.port.bound(*part.ball) for end in self.ends)
@@ -158,12 +158,12 @@ class _Part:
 
     surface: Callable[[], Surface]
     material: Material
-    rays: RayScene  # what hides it, but for a plate's own facets
-    ball: tuple[Float[np.ndarray, " 3"], float] | None  # around it; None: unknown
+    rays: RayScene  # surfaces that may hide it, without a plate's own facets
+    ball: tuple[Float[np.ndarray, " 3"], float] | None  # bounding sphere [m]; None: unknown
 
 
 class _PartSums:
-    """The facets of a part, made when the first link needs them."""
+    """The facets of a part, made for the first link that needs them."""
 
     def __init__(self, part: _Part, frequencies: Float[np.ndarray, " freqs"]) -> None:
         self.part, self.frequencies = part, frequencies
@@ -202,7 +202,7 @@ class _PartSums:
         place = end.port.position
         key = place.tobytes()
         if key in self._seen:
-            self._seen[key] = self._seen.pop(key)  # the transmitter's stays the latest
+            self._seen[key] = self._seen.pop(key)  # the transmitter's is dropped last
             return self._seen[key]
         mask: Bool[np.ndarray, " facets"] | None = None
         if self.part.rays.objects:
@@ -261,7 +261,7 @@ def _links(scene: MultistaticScene) -> list[_Link]:
 
 
 def _parts(scene: MultistaticScene) -> Iterator[tuple[_Part, tuple[float, float]]]:
-    """Go over all that scatters; with each part, those before it and the number in all."""
+    """Yield each scattering part, with the amount of work before it and in all."""
     scenario = scene.scenario
     names = [
         name

@@ -1,4 +1,4 @@
-"""What the facets of a scene scatter of waves that come past everything, or through slabs."""
+"""Scattering by the facets of a scene over one surface, in line of sight or through slabs."""
 
 from collections.abc import Callable
 
@@ -19,7 +19,7 @@ def over_one_surface(
     *,
     advance: Callable[[], None],
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the facets' echoes for each link, over all ways there and back.
+    """Sum the facets' scattering for each link, directly and through each set of slabs.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def over_one_surface(
     total: np.ndarray | None = None
     for there in out:
         for here in back:
-            # An antenna sees each facet over one way only.
+            # For an antenna, each facet is behind one set of slabs only.
             if receive is transmit and here is not there:
                 continue
             if total is not None and not (there.visible & here.visible).any():

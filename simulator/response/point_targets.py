@@ -1,11 +1,10 @@
-r"""What ideal points scatter: the radar equation, each leg tested for occlusion.
+r"""Echo and pilot scattered by ideal points: the radar equation, each leg tested for occlusion.
 
 .. math:: S = \frac{\lambda \sqrt{\sigma}}{(4\pi)^{3/2} R_t R_r} g_t g_r e^{-jk(R_t + R_r)}
 
-Points see neither each other nor the mirrors: only the direct ways count. They are no surfaces, and
-what they return is no bounce: it is there with ``max_bounces = 0``, too.
-They keep the polarization: between antennas of different ones, the cosine of the angle between
-their axes counts.
+Only direct legs count: no scattering between points, none over mirrors. Scattering by a point is
+not a bounce: it is included with ``max_bounces = 0``, too. Points preserve polarization: between
+antennas of different ones the amplitude has the cosine of the angle between their axes as factor.
 """
 
 from typing import NamedTuple
@@ -27,13 +26,13 @@ from simulator.scene.radio_scene import RadioScene
 class _Leg(NamedTuple):
     axis: Float[np.ndarray, " 3"]  # of the antenna's polarization
     gains: Complex[np.ndarray, "places freqs"]
-    """Of the antenna and of slabs on the way, 0 where the point is hidden. [-]"""
+    """Product of the antenna's pattern and the slabs' transmission, 0 if occluded. [-]"""
 
     distances: Float[np.ndarray, " places"]  # [m]
 
 
 def point_echo(scene: RadioScene) -> Complex[np.ndarray, "positions freqs"]:
-    """Simulate the echo of a scenario's points, each position on its own.
+    """Simulate the echo of a scenario's points at each position of the array.
 
     Returns
     -------
@@ -52,7 +51,7 @@ def point_echo(scene: RadioScene) -> Complex[np.ndarray, "positions freqs"]:
 
 
 def point_uplink(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
-    """Simulate what a scenario's points scatter of a user's pilot.
+    """Simulate a user's pilot scattered by a scenario's points.
 
     Returns
     -------
@@ -107,7 +106,7 @@ def _inserted(
     distances: Float[np.ndarray, " some"],
     axis: Float[np.ndarray, " 3"],
 ) -> Complex[np.ndarray, "some freqs"]:
-    """Return what slabs leave of a leg's field. [-]."""
+    """Return the slabs' transmission along a leg. [-]."""
     scenario, crossings = scene.scenario, scene.slabs.crossings(slabs)
     frequencies = scenario.radio.frequencies
     if scenario.dimensions == 2:

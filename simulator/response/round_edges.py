@@ -1,9 +1,9 @@
-"""A user's pilot round the edges of opaque bodies, in two dimensions.
+"""A user's pilot diffracted round edges of opaque bodies, in two dimensions.
 
-One edge at a time, seen from both ends. Where both ends see a face of the edge from the same side,
-the facets of physical optics and their fringe currents radiate the same wave already, and nothing
-is added. Left out: waves round two and more edges, round curved bodies, in echoes and chains,
-through slabs, and round the edges of slabs that let waves through.
+Single diffraction at edges visible from both ends. If both ends are on the same side of a face of
+the edge, the facets of physical optics and their fringe currents already radiate this wave, and
+nothing is added. Left out: diffraction at two and more edges and at curved bodies, in echoes and
+in chains of mirrors, through slabs, and at the edges of slabs that transmit waves.
 """
 
 from collections.abc import Iterator
@@ -23,25 +23,25 @@ from simulator.scene.radio_scene import RadioScene, scenario_materials
 from simulator.specular.free_space import direct_wave
 
 OUT = 2e-5
-"""How far off the edge rays to it end: ten times the least clearance of rays. [m]"""
+"""Distance from the edge at which rays to it end: ten times the least clearance of rays. [m]"""
 
 
 class _Edge(NamedTuple):
     place: Float[np.ndarray, " 3"]  # [m]
     inward: Float[np.ndarray, "faces 3"]  # unit vectors along the one or two faces
-    exterior: float  # angle that is filled with air, over π [-]
+    exterior: float  # exterior angle (filled with air), over π [-]
     conducts: bool
 
 
 def pilot_round_edges(scene: RadioScene, user: User) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum what single edges diffract of a user's pilot.
+    """Sum a user's pilot over single diffraction at edges.
 
     Parameters
     ----------
     scene
         The frozen scene, of two dimensions.
     user
-        Transmits.
+        The transmitting user.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def pilot_round_edges(scene: RadioScene, user: User) -> Complex[np.ndarray, "ele
 
 
 def scene_edges(scene: RadioScene) -> Iterator[_Edge]:
-    """Find the ends of plates and the corners of boxes that let nothing through."""
+    """Yield the ends of opaque plates and the corners of opaque boxes."""
     scenario, materials = scene.scenario, scenario_materials(scene.scenario)
     for surface in scene.surfaces:
         body = scenario.objects[surface.name]
@@ -142,7 +142,7 @@ def _facets_do(
     incident: Float[np.ndarray, " 1"],
     outgoing: Float[np.ndarray, " n"],
 ) -> np.ndarray:
-    """Tell where both ends see a face of a conductor from one side: its facets radiate there."""
+    """Return for which elements the facets of a conductor already radiate the diffracted wave."""
     if not edge.conducts or scene.scenario.max_bounces == 0:
         return np.zeros(outgoing.shape, dtype=bool)
     if len(edge.inward) == 1:  # a plate: both before it, or both behind

@@ -1,4 +1,4 @@
-"""Links over the facets of a scene in space, of any number: in reach, seen, and summed."""
+"""Links over any number of facets of a 3-D scene: selection by beam and visibility, and sum."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,14 +32,15 @@ def scattered_in_space(
     *,
     advance: Callable[[], None] = lambda: None,
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum what the facets scatter from one or several antennas to each of the array.
+    """Sum the fields scattered by the facets from one or several antennas to each of the array.
 
     Parameters
     ----------
     scene
         The frozen scene.
     send, receive
-        Pairwise; a single sender serves all receivers. The same object: echoes.
+        Antennas, linked pairwise; a single sender is linked with all receivers. The same object:
+        monostatic echoes.
     advance
         Called for each receiver.
 
@@ -118,18 +119,18 @@ class _Insertion:
 
 
 def _own_faces(scene: RadioScene, name: str) -> int:
-    """Return the set of faces that no facet of an object is seen through: its own, if convex."""
+    """Return the set of faces that never hide an object's own facets: its own, if convex."""
     if object_shape(scene.scenario, name) != "convex":
         return 0
     return sum(1 << face for face, owner in enumerate(scene.slabs.owners) if owner == name)
 
 
 def _nobody() -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 def sightlines(scene: RadioScene, send: AntennaGroup, receive: AntennaGroup) -> Sightlines:
-    """Tell what links see of a scene's facets, past what lets nothing through."""
+    """Return the visibility test of a scene's facets for links, among the opaque surfaces."""
     if scene.facets is None:
         raise ValueError("the scene has no facets; give a scene with a scattering object")
     known = list(scene.scenario.objects)

@@ -1,4 +1,4 @@
-"""A user's pilot at the array: the line of sight, and what the facets scatter of it."""
+"""A user's pilot at the array: line of sight, specular chains, and scattering by facets."""
 
 from collections.abc import Callable
 from functools import partial
@@ -41,13 +41,13 @@ def simulate_uplink(
     scene
         The frozen scene.
     user
-        Transmits.
+        The transmitting user.
     array
         Ports of the array; ``None`` if nothing scatters.
     advance
-        Called for each element that is done.
+        Called after each element.
     over_several
-        Told how much is done of what comes over several surfaces.
+        Called with the progress of the part over several surfaces.
 
     Returns
     -------
@@ -89,12 +89,12 @@ def simulate_uplink(
 def _over_mirrors(
     scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum the specular paths over two and more mirrors, in space."""
+    """Sum the specular paths over two and more mirrors, in three dimensions."""
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
     if scene.mirrors is None or most < 2:
         return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
-    # From the user the mirrors of a leg of the array are met in turn; other chains are out of
-    # the reach of the array's pattern, whatever the user's.
+    # From the user, a leg's mirrors are met in reverse order; chains that are not legs of the
+    # array lie outside its pattern, for any user.
     chains = (
         trace_chain(
             scene.mirrors.mirrors,
@@ -125,7 +125,7 @@ def _over_mirrors(
 def _diffuse_over_mirrors(
     scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum what any one rough mirror of two and more scatters diffusely, in space."""
+    """Sum diffuse scattering by one rough mirror of chains of two and more, in 3-D."""
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
     response = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     if scene.mirrors is None or most < 2:

@@ -1,6 +1,6 @@
-"""A scenario made ready to be simulated: frozen surfaces, mirrors, antennas; and its truth.
+"""Preparation of a scenario for simulation: frozen surfaces, mirrors, antennas; and its truth.
 
-Also the specular paths that a plan of the scenario shows.
+Also the specular paths drawn in the plan of a scenario.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""The antennas of a scenario in space, and where facets are needed because they look there."""
+"""The antennas of a 3-D scenario, and the regions in which their beams require facets."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -17,19 +17,19 @@ from simulator.specular.image_sources import DIRECT, Leg
 
 
 def in_space(scenario: Scenario) -> bool:
-    """Tell whether a scenario is three-dimensional and heard by an array of parallel antennas."""
+    """Return whether a scenario is 3-D and received by an array of parallel antennas."""
     return scenario.dimensions == 3 and not scenario.base_station.multistatic
 
 
 def array_group(scenario: Scenario, elements: Float[np.ndarray, "elements 3"]) -> AntennaGroup:
-    """Return the array's antennas, which look in parallel."""
+    """Return the array's antennas, which all have the same aim."""
     return _group(scenario, scenario.base_station.antenna, elements)
 
 
 def sending_group(
     scenario: Scenario, elements: Float[np.ndarray, "elements 3"]
 ) -> AntennaGroup | None:
-    """Return the antennas that transmit the array's echo; None: the elements themselves."""
+    """Return the antennas that transmit for the echo; None: the elements themselves."""
     offset = scenario.base_station.transmit_offset
     if offset is None:
         return None
@@ -48,18 +48,18 @@ def needed_reach(
     legs: Sequence[Leg],
     rough: Sequence[DiffuseLeg] = (),
 ) -> Reach:
-    """Tell where facets of an object are needed.
+    """Return the region in which facets of an object are needed.
 
     Parameters
     ----------
     scenario
-        Its base station and its users.
+        Supplies the base station and the users.
     elements
-        Where the array's antennas truly stand. [m]
+        True positions of the array's antennas, jitter included. [m]
     legs
-        Ways over mirrors on which the object is seen, too.
+        Legs over mirrors that illuminate the object, too.
     rough
-        Ways over several mirrors, of which the object is the one that scatters diffusely.
+        Legs over several mirrors, of which the object is the one that scatters diffusely.
     """
     array = array_group(scenario, elements)
     send = sending_group(scenario, elements) or array

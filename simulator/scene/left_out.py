@@ -1,8 +1,9 @@
-"""What a simulation leaves out, class by class, with the level that it would have.
+"""Classes of paths that a simulation leaves out, with an estimate of their level.
 
 Levels are those of single specular paths between each user and the centre of the array, at the
-middle of the band, over that user's strongest simulated path; round bends they are Fresnel's knife
-edge (ITU-R P.526, eq. 26 to 31). They say what is missing, not what it would look like.
+middle of the band, relative to that user's strongest simulated path; for diffraction round edges,
+of Fresnel's knife edge (ITU-R P.526, eq. 26 to 31). They estimate strength only, not delay or
+direction.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,31 +33,31 @@ from simulator.specular.image_method import find_chains
 from simulator.specular.path_field import specular_response
 
 MOST_CHAINS = 50_000
-"""Sequences of mirrors that are looked through for a path of one more bounce: some seconds. [-]"""
+"""Most sequences of mirrors searched for a path of one more bounce: some seconds. [-]"""
 
 LONGEST_COMPARED = 2
-"""Bounces up to which the strongest simulated path is looked for: more make it no stronger. [-]"""
+"""Bounces up to which the strongest simulated path is searched: longer paths are weaker. [-]"""
 
 FAINT_DB = -60.0
-"""Level over the strongest path below which nothing is told. [dB]"""
+"""Level relative to the strongest path below which nothing is reported. [dB]"""
 
 EDGE_STEP = 0.02
-"""Distance of the places on a body's edges round which waves are sent. [m]"""
+"""Spacing of the points on a body's edges at which diffraction is evaluated. [m]"""
 
 
 class LeftOut(NamedTuple):
     """A class of paths that a simulation leaves out."""
 
     what: str
-    level_db: float  # of its strongest path over the strongest simulated one [dB]
+    level_db: float  # of its strongest path relative to the strongest simulated one [dB]
 
     def __str__(self) -> str:
-        """Tell it in words."""
+        """Return the class and its level as text."""
         return f"{self.what}: {self.level_db:.0f} dB of the strongest path"
 
 
 def effects_told(scenario: Scenario) -> str:
-    """Say which effects are on and which are off."""
+    """Return as text which effects are on and which are off."""
     told = [f"up to {scenario.max_bounces} bounces"]
     for name in Effects.model_fields:
         told.append(f"{name} {'on' if getattr(scenario.effects, name) else 'off'}")
@@ -73,7 +74,7 @@ def left_out(scenario: Scenario) -> tuple[LeftOut, ...]:
 
     Returns
     -------
-    One entry for each class, of the user that it matters most for. Nothing below
+    One entry for each class, of the user for which its level is highest; none below
     :data:`FAINT_DB`.
     """
     if scenario.base_station.multistatic:
@@ -90,12 +91,12 @@ def left_out(scenario: Scenario) -> tuple[LeftOut, ...]:
 
 
 def model_told(scenario: Scenario) -> dict[str, str | list[str]]:
-    """Tell by what model a scenario is simulated, and what that leaves out.
+    """Return by what model a scenario is simulated, and what that leaves out.
 
     Returns
     -------
     ``model``: bounces and effects; ``left_out``: classes of paths with their level;
-    ``bodies_left_out``: names of bodies that are not seen over walls.
+    ``bodies_left_out``: names of bodies without echoes over walls.
     """
     return {
         "model": effects_told(scenario),
@@ -105,7 +106,7 @@ def model_told(scenario: Scenario) -> dict[str, str | list[str]]:
 
 
 def model_lines(told: Mapping[str, object]) -> Iterator[str]:
-    """Put what :func:`model_told` returns into lines of text, one for the model."""
+    """Yield the document of :func:`model_told` as lines of text, one for the model."""
     left = told.get("left_out")
     most = str(left[0]) if isinstance(left, list) and left else "nothing known above -60 dB"
     yield f"{told.get('model')}; left out of pilots, at most: {most}"
@@ -118,7 +119,7 @@ def model_lines(told: Mapping[str, object]) -> Iterator[str]:
 
 
 def bodies_not_seen_over_walls(scenario: Scenario) -> tuple[str, ...]:
-    """Name the bodies in space that are too large for ghosts, and no mirrors either."""
+    """Return the names of bodies in 3-D too large to be facetted for ghosts, but not mirrors."""
     if scenario.dimensions != 3 or scenario.max_bounces < 2 or scenario.base_station.multistatic:
         return ()
     surfaces = {surface.name: surface for surface in mean_surfaces(scenario)}
@@ -180,7 +181,7 @@ class _Room(NamedTuple):
     def pilot(
         self, name: str, fewest: int, most: int, *, line_of_sight: bool | None = None
     ) -> float:
-        """Return the strongest path's amplitude over so many mirrors. [-]."""
+        """Return the amplitude of the strongest path with a number of reflections. [-]."""
         sender, array = self._ends(name)
         if line_of_sight is None:
             line_of_sight = self.scenario.effects.line_of_sight
@@ -212,7 +213,7 @@ class _Room(NamedTuple):
         return max((float(np.abs(level[0, 0, 0])) for level in levels), default=0.0)
 
     def round_an_edge(self, name: str) -> float:
-        """Return the amplitude of the way round the nearest edge, where the straight one is shut.
+        """Return the amplitude diffracted at the nearest edge, if the line of sight is blocked.
 
         Fresnel's knife edge, with the parameter v = 2 √(Δ/λ) of the detour Δ. [-]
         """
@@ -225,7 +226,7 @@ class _Room(NamedTuple):
         detours = lengths[0] + lengths[1] - straight
         for nearest in np.argsort(detours)[:64]:
             place = self.edges[nearest]
-            # Just beyond the edge: from the straight line's nearest place outward.
+            # Just beyond the edge, away from the nearest point of the straight line.
             share = lengths[0][nearest] / (lengths[0][nearest] + lengths[1][nearest])
             outward = place - (user + share * (centre - user))
             beyond = place + 1e-4 * outward / max(float(np.linalg.norm(outward)), 1e-9)

@@ -1,4 +1,4 @@
-"""Where the model of a scenario is known to leave full wave: told, not refused."""
+"""Surfaces for which the model is known to deviate from full wave: reported, not refused."""
 
 from dataclasses import replace
 
@@ -15,16 +15,16 @@ along a conductor, and an echo at 45° was 2 dB too strong beyond. [-]"""
 
 
 def rms_slope(run: Run) -> float:
-    """Return the rms slope of a run's heights, as its facets have them. [-]."""
+    """Return the rms slope of a run's heights, sampled at its facets. [-]."""
     if not run.rough:
         return 0.0
     return float(np.sqrt(np.mean(np.diff(run.heights) ** 2))) / run.step
 
 
 def model_notes(scenario: Scenario, *, seed: int) -> tuple[str, ...]:
-    """Tell which surfaces are so steep that the simulator leaves full wave by more than 1 dB.
+    """Return notes on surfaces so steep that the simulator deviates from full wave by over 1 dB.
 
-    In three dimensions nothing is told: triangles are summed otherwise.
+    Only in two dimensions: in three, triangles are summed by another method.
 
     Parameters
     ----------

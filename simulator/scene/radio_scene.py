@@ -1,4 +1,4 @@
-"""A scenario made ready to be simulated: frozen facets, the scene for rays, antenna ports."""
+"""A scenario prepared for simulation: frozen facets, the scene for ray tests, antenna ports."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -51,17 +51,17 @@ class RadioScene:
     """One realisation of a scenario: the same facets for every antenna and frequency."""
 
     scenario: Scenario
-    rays: RayScene  # among what lets nothing through
+    rays: RayScene  # of the opaque surfaces
     facets: Facets | None  # None: nothing scatters
-    elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
-    scattering: tuple[str, ...] = ()  # names of the objects that the facets' materials belong to
-    mirrors: SceneMirrors | None = None  # in space
-    slabs: Slabs = field(default_factory=no_slabs)  # what lets waves through
+    elements: Float[np.ndarray, "elements 3"]  # true positions of the array's antennas [m]
+    scattering: tuple[str, ...] = ()  # objects to which the facets' material indices refer
+    mirrors: SceneMirrors | None = None  # in 3-D
+    slabs: Slabs = field(default_factory=no_slabs)  # surfaces that transmit waves
     surfaces: tuple[Surface, ...] = ()  # of all objects
 
     @cached_property
     def rays_to_all(self) -> RayScene:
-        """Among all surfaces, those that let waves through, too."""
+        """The scene of all surfaces, transmitting ones included."""
         if not len(self.slabs):
             return self.rays
         return build_scene(self.surfaces, mean=True)
@@ -74,7 +74,7 @@ class RadioScene:
 
     @cached_property
     def mutual_visibility(self) -> MutualVisibility:
-        """Which facets see each other: the same for all antennas, in echo and uplinks."""
+        """Mutual visibility of the facets: the same for all antennas, in echo and uplinks."""
         faces = () if self.facets is None else scattering_faces(self.facets)
         frequencies = self.scenario.radio.frequencies
         band = float(frequencies[0]), float(frequencies[-1])
@@ -89,7 +89,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
     ScenarioError
         If a material is not known over the band, or its table cannot be read.
     """
-    materials = scenario_materials(scenario)  # first: it is quick, and may fail
+    materials = scenario_materials(scenario)  # first: errors show before long work
     elements = true_elements(scenario, seed=seed, sample=sample)
     slabs = scene_slabs(scenario, materials)
     if scenario.max_bounces == 0:  # surfaces only block rays
@@ -122,7 +122,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
             scattering[name] = (surface, material)
     return RadioScene(
         scenario=scenario,
-        # Roughness is the weights' business, and hides nothing.
+        # Rays meet the mean surface: roughness enters the facets' weights and casts no shadow.
         rays=build_scene(opaque(surfaces, slabs), mean=True),
         facets=(
             scene_facets(
@@ -142,7 +142,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
 
 
 def opaque(surfaces: Sequence[Surface], slabs: Slabs) -> list[Surface]:
-    """Choose the surfaces that let nothing through."""
+    """Return the opaque surfaces."""
     return [surface for surface in surfaces if surface.name not in slabs.owners]
 
 
@@ -163,7 +163,7 @@ def _mirrors(
 
 
 def true_elements(scenario: Scenario, *, seed: int, sample: int) -> Float[np.ndarray, "elements 3"]:
-    """Return where the base station's antennas stand, jitter included [m]."""
+    """Return the true positions of the base station's antennas, jitter included [m]."""
     nominal = scenario.base_station.element_positions
     jitter = scenario.impairments.position_jitter
     if jitter == 0:
@@ -177,13 +177,13 @@ def true_elements(scenario: Scenario, *, seed: int, sample: int) -> Float[np.nda
 
 
 def scenario_materials(scenario: Scenario) -> dict[str, Material]:
-    """Return what each object is made of.
+    """Return the material of each object.
 
     Raises
     ------
     ScenarioError
-        If a material is not known over the band, ripples too fast over it, or its table of
-        permittivity cannot be read; the message names the object's key.
+        If a material is not known over the band, its coefficients ripple too fast to be
+        interpolated, or its table of permittivity cannot be read; the message names the key.
     """
     frequencies = scenario.radio.frequencies
     made: dict[str | Slab, Material] = {}
@@ -217,7 +217,7 @@ def _material(material: str | Slab, frequencies: Float[np.ndarray, " freqs"]) ->
 
 
 def antenna_pattern(antenna: Antenna, aim: Float[np.ndarray, " 3"]) -> Pattern:
-    """Return an antenna's field pattern as the facets use it; it does not vary with frequency."""
+    """Return an antenna's field pattern for the sum over facets, the same at all frequencies."""
     if isinstance(antenna, Isotropic):
         return isotropic
 
@@ -234,7 +234,7 @@ def antenna_pattern(antenna: Antenna, aim: Float[np.ndarray, " 3"]) -> Pattern:
 def facet_ports(
     scene: RadioScene, facets: Facets, antenna: Antenna, positions: Float[np.ndarray, "ports 3"]
 ) -> Ports:
-    """Place equal antennas at positions; find which facets each sees, and through what."""
+    """Return ports of equal antennas, with the facets visible to each and the slabs between."""
     ports = Ports(
         positions=positions,
         pattern=antenna_pattern(antenna, scene.scenario.aim(antenna, positions.mean(axis=0))),
@@ -261,7 +261,7 @@ def _through(
     crossings: tuple[Crossing, ...],
     behind: Bool[np.ndarray, "ports facets"],
 ) -> Ports | None:
-    """Look at what is behind a set of slabs; None if they let too little through."""
+    """Return the ports for facets behind a set of slabs; None if these transmit too little."""
     scenario = scene.scenario
     frequencies = scenario.radio.frequencies
     if passage_level(crossings, frequencies) < LEAST_LEVEL:

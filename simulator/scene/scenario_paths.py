@@ -43,17 +43,17 @@ class ScenarioPath:
     kind: Literal["user", "object", "receiver"]
     vertices: Float[np.ndarray, "vertices 3"]  # from the array onward [m]
     gain_db: float  # of both antennas in its direction, relative to their peaks [dB]
-    through: tuple[str, ...] = ()  # objects that it leads through, as often as it meets a slab
-    transmission_db: float = 0.0  # what these let through in the middle of the band [dB]
+    through: tuple[str, ...] = ()  # objects that it crosses, once for each slab met
+    transmission_db: float = 0.0  # of these, in the middle of the band [dB]
 
     @property
     def bounces(self) -> int:
-        """Number of mirrors on the way."""
+        """Number of reflections."""
         return len(self.vertices) - 2
 
     @property
     def length(self) -> float:
-        """Length of the way [m]."""
+        """Length of the path [m]."""
         return float(np.linalg.norm(np.diff(self.vertices, axis=0), axis=-1).sum())
 
 
@@ -67,9 +67,9 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
 
     Returns
     -------
-    First the users' paths, then those to the nearest place of each object that is no plate;
-    by number of bounces. Where antennas stand by themselves, the path from the first transmitter
-    over each mirror to the receiver that hears it best.
+    First the users' paths, then those to the nearest place of each object other than plates; by
+    number of bounces. For separate antennas, the path from the first transmitter over each mirror
+    to the receiver with the strongest signal.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
 
 
 class _Room(NamedTuple):
-    """What reflects, what blocks, and what lets through."""
+    """The mirrors, the opaque surfaces and the transmitting slabs of a scenario."""
 
     mirrors: Mirrors
     rays: RayScene
@@ -140,7 +140,7 @@ def _to_users(scenario: Scenario, room: _Room) -> Iterator[ScenarioPath]:
 
 
 def _transmission_db(scenario: Scenario, room: _Room, chain: Chain, sets: tuple[int, ...]) -> float:
-    """Level of a vertical field behind the slabs on a chain's first path, over that before [dB]."""
+    """Transmission of a vertical field through the slabs on a chain's first path [dB]."""
     middle, loss = np.array([scenario.radio.centre_frequency]), 0.0
     vertical = scenario.dimensions == 3 or scenario.radio.polarization == "vertical"
     for leg, one in enumerate(sets):
@@ -175,7 +175,7 @@ def _to_receivers(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Itera
     for chain in chains:
         valid = np.flatnonzero(chain.valid[0])
         if len(chain.vertices[0]) == 0:
-            continue  # from horn to horn: no part of the echo
+            continue  # direct coupling between the horns: not part of the echo
         gains = [
             _gain_db(scenario, station.transmit_antenna, sender, departure)
             + _gain_db(scenario, station.antenna, places[index], arrival)
@@ -207,7 +207,7 @@ def _to_object(scenario: Scenario, surface: Surface, room: _Room) -> list[Scenar
         receiver_offsets=rays.clearance * outward,
         slabs=slabs,
     )
-    # The body is a surface, too, and the echo returns over at least the fewest mirrors.
+    # The body's surface is one bounce; the return leg has at least the fewest mirrors.
     lit = [chain for chain in chains if _lit(chain, outward).any()]
     fewest = min((len(chain.mirrors) for chain in lit), default=0)
     lit = [one for one in lit if fewest + 1 + len(one.mirrors) <= scenario.max_bounces]
@@ -233,7 +233,7 @@ def _to_object(scenario: Scenario, surface: Surface, room: _Room) -> list[Scenar
 
 
 def _lit(chain: Chain, outward: Float[np.ndarray, "places 3"]) -> Bool[np.ndarray, " paths"]:
-    """Tell which paths arrive at the outer side of the surface."""
+    """Return which paths arrive at the outer side of the surface."""
     normals = outward[np.flatnonzero(chain.valid[0])]
     lit: np.ndarray = np.einsum("px,px->p", chain.arrivals, normals) > 0
     return lit
@@ -242,7 +242,7 @@ def _lit(chain: Chain, outward: Float[np.ndarray, "places 3"]) -> Bool[np.ndarra
 def _places(
     surface: Surface,
 ) -> tuple[Float[np.ndarray, "places 3"], Float[np.ndarray, "places 3"]]:
-    """Spread places over a surface's cells, with the cells' outward normals."""
+    """Return places spread over a surface's cells, with the cells' outward normals."""
     points = surface.vertices[surface.cells]
     share = (np.arange(PLACES) + 0.5) / PLACES
     if surface.cells.shape[1] == 2:

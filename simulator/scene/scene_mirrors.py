@@ -1,4 +1,4 @@
-"""The mirrors of a scene in space, whose they are, and the ways over them that antennas reach."""
+"""The mirrors of a 3-D scene, the objects they belong to, and the legs over them within beams."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from simulator.materials.fresnel_slab import Material
 from simulator.specular.image_sources import Leg, legs_within_reach
 
 LARGEST_TARGET = 0.5
-"""Longest side of a body that is cut into facets where it is seen over mirrors; larger ones are
-mirrors themselves. [m]"""
+"""Longest side of a body that is divided into facets for echoes over mirrors; faces of larger
+bodies are mirrors. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SceneMirrors:
-    """Mirrors, and the legs over them."""
+    """The mirrors of a scene, and the legs over them."""
 
     mirrors: Mirrors
     owners: tuple[str, ...]  # the object that each mirror is a face of
-    legs: tuple[Leg, ...]  # that leave a mirror to be spent on a target
-    chains: tuple[Leg, ...]  # as long as may be
-    targets: tuple[str, ...]  # objects that are seen over legs
+    legs: tuple[Leg, ...]  # to targets: one bounce is left for the target
+    chains: tuple[Leg, ...]  # up to the largest number of bounces
+    targets: tuple[str, ...]  # objects whose facets are illuminated over legs
 
     def of(self, name: str) -> frozenset[int]:
         """Mirrors that are faces of an object."""
@@ -41,7 +41,7 @@ def scene_mirrors(
     Parameters
     ----------
     scenario, materials
-        What there is.
+        The scene, and the material of each object.
     groups
         The array's antennas.
     """
@@ -70,7 +70,7 @@ def scene_mirrors(
 
 
 def longest_side(scenario: Scenario, name: str) -> float:
-    """Return the longest side of a body [m]; a plate is none."""
+    """Return the longest side of a body [m]; a plate is not a body."""
     body = scenario.objects[name]
     match body:
         case Plate():

@@ -1,4 +1,4 @@
-"""Which of a scenario's bodies let waves through."""
+"""The bodies of a scenario that transmit waves, as slabs."""
 
 from collections.abc import Mapping
 
@@ -14,21 +14,21 @@ from simulator.materials.slab_insertion import LEAST_LEVEL, Crossing, passage_le
 
 
 def is_slab(material: Material) -> bool:
-    """Tell whether a material has a far face that waves may come out of."""
+    """Return whether waves may leave a material through its far face."""
     return isinstance(material, Dielectric) and bool(np.isfinite(material.thickness))
 
 
 def scene_slabs(scenario: Scenario, materials: Mapping[str, Material]) -> Slabs:
-    """Find the faces that let waves through; plates first, then bodies, as shells of slabs.
+    """Return the faces that transmit waves: plates first, then bodies, as shells of slabs.
 
-    Cylinders and meshes of many faces block: their faces are no planes. So does what lets less
-    through than -60 dB, and what there are no bits left for
+    Opaque are cylinders and meshes of many faces, which are not planes; slabs that transmit less
+    than -60 dB; and slabs beyond the number that the bit sets of crossed slabs can hold
     (:data:`simulator.geometry.slabs.MOST_SLABS`).
 
     Parameters
     ----------
     scenario, materials
-        What there is, and what it is made of.
+        The scene, and the material of each object.
     """
     if not scenario.effects.transmission:
         return no_slabs()

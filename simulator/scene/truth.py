@@ -1,4 +1,4 @@
-"""The truth of a scenario, stored beside its measurement and never shown to the estimator."""
+"""The ground truth of a scenario, stored with its measurement and never given to the estimator."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from scenes.schema.objects import Cylinder, MeshFile, Plate, SceneObject
 
 
 class _Target(NamedTuple):
-    """A body that is no flat mirror."""
+    """A body other than a plate."""
 
     kind: str  # point, cylinder, box or mesh
     position: np.ndarray  # centre [m]
@@ -21,7 +21,7 @@ class _Target(NamedTuple):
 
 
 def scenario_truth(scenario: Scenario) -> xr.Dataset:
-    """Lay out where users, walls (plates) and targets (other bodies) are; absorbers are neither.
+    """Return where users, walls (plates) and targets (other bodies) are, without absorbers.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def _targets(scenario: Scenario) -> dict[str, _Target]:
         if not isinstance(body, Plate) and body.material != "absorber"
     }
     for name, point in scenario.points.items():
-        # An object's name holds no dot, so that this one is free.
+        # An object's name holds no dot, so this one cannot collide.
         label = f"points.{name}" if name in found else name
         found[label] = _Target("point", point.position, np.zeros(3), 0.0)
     return found

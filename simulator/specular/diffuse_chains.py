@@ -1,4 +1,4 @@
-"""Legs over mirrors of which one is rough and scatters diffusely; where its facets are needed."""
+"""Legs over mirrors of which one is rough and scatters diffusely, and the reach of its facets."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from simulator.specular.image_method import within_reach
 from simulator.specular.image_sources import DIRECT, Leg
 
 DIFFUSE_LEVEL = 0.1
-"""Product of two field patterns, over that of their peaks, that is left out: of the diffuse power
-that a Gaussian beam throws at a wall, one per cent. [-]"""
+"""Product of two field patterns, relative to their peaks, below which facets are left out: 1 % of
+the diffuse power scattered from a wall in a Gaussian beam. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiffuseLeg:
-    """A leg from the array; its rough mirror, and the mirrors on either side of that."""
+    """A leg from the array, its rough mirror, and the mirrors before and after that."""
 
-    leg: Leg  # as it would be specularly
+    leg: Leg  # the specular leg over all mirrors
     rough: int
     before: Leg  # from the array to the rough mirror
     after: Leg  # from the other end to the rough mirror
@@ -29,7 +29,7 @@ class DiffuseLeg:
 
 
 def diffuse_legs(mirrors: Mirrors, legs: Sequence[Leg]) -> Iterator[DiffuseLeg]:
-    """Choose any one rough mirror of each leg."""
+    """Yield each leg with each of its rough mirrors as the diffuse one."""
     for leg in legs:
         for place, mirror in enumerate(leg.sequence):
             if mirrors.rms_heights[mirror] > 0:
@@ -42,7 +42,7 @@ def diffuse_legs(mirrors: Mirrors, legs: Sequence[Leg]) -> Iterator[DiffuseLeg]:
 
 
 def may_reach(mirrors: Mirrors, chain: DiffuseLeg, array: AntennaGroup) -> bool:
-    """Tell whether rays over the mirrors before it may meet the rough one at all."""
+    """Return whether rays over the mirrors before the rough one may meet it."""
     if not chain.before.sequence:
         return True
     images = chain.before.image(array).outline

@@ -16,19 +16,19 @@ from simulator.geometry.ray_scene import CLEARANCE
 from simulator.geometry.slabs import Slabs
 
 ROUGHNESS_CLEARANCE = 6.0
-"""How much farther off a rough mirror a segment starts, over its rms height: no crest is higher
-(1 in 1e9). [-]"""
+"""Additional clearance of a segment from a rough mirror, in rms heights: a Gaussian height exceeds
+it with a probability of 1e-9. [-]"""
 
 ON_PLANE = 1e-9
-"""Below this distance a point lies in the mirror's plane, which does not reflect it. [m]"""
+"""Distance below which a point counts as in the mirror's plane, and has no image. [m]"""
 
 PAIRS_AT_ONCE = 500_000
-"""Source-receiver pairs traced in one go: some 50 MB for each vector quantity."""
+"""Source-receiver pairs traced in one batch: some 50 MB for each vector quantity. [-]"""
 
 Blocked = Callable[
     [Float[np.ndarray, "rays 3"], Float[np.ndarray, "rays 3"]], Bool[np.ndarray, " rays"]
 ]
-"""Tells which straight segments, from starts to ends, meet a surface."""
+"""Returns which straight segments, from starts to ends, meet a surface."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Chain:
     mirrors: tuple[int, ...]  # from the source onward
     valid: Bool[np.ndarray, "sources receivers"]
     lengths: Float[np.ndarray, " paths"]  # [m]
-    vertices: Float[np.ndarray, "paths bounces 3"]  # where the mirrors are hit [m]
+    vertices: Float[np.ndarray, "paths bounces 3"]  # points of reflection [m]
     cosines: Float[np.ndarray, "paths bounces"]  # of the angles of incidence [-]
     directions: Float[np.ndarray, "paths legs 3"]  # unit vectors of travel, bounces + 1 legs
     crossed: Int[np.ndarray, "paths legs"] | None = None  # sets of slabs on each leg; None: none
@@ -76,13 +76,13 @@ def find_chains(
     Parameters
     ----------
     mirrors
-        The mirrors, each no more than once in a row.
+        The mirrors; none reflects twice in succession.
     sources, receivers
         End points; every source is linked with every receiver. [m]
     blocked
         Occlusion test, called with float64 segments that begin and end just off the mirrors.
     clearance
-        How far off their mirrors; the test may need more in larger scenes. [m]
+        Distance of these ends from the mirrors; larger scenes may need more. [m]
     max_bounces, min_bounces
         Bounces of the chains to return; 0 is the line of sight.
     receivers_on
@@ -90,7 +90,7 @@ def find_chains(
     receiver_offsets
         Moves the receivers, for the occlusion test only, off the surface they lie on. [m]
     slabs
-        What lets waves through, of which the chains tell what they cross.
+        Transmitting surfaces; the chains record which of them their legs cross.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def unfolded_chain(
     *,
     paired: bool = False,
 ) -> Chain:
-    """Lay paths over a sequence of mirrors as if those were endless and nothing in the way.
+    """Return paths over a sequence of mirrors taken as infinite planes, without occlusion.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ _Images = Float[np.ndarray, "bounces sources 3"]
 def _sequences(
     mirrors: Mirrors, sources: Float[np.ndarray, "sources 3"], max_bounces: int
 ) -> Iterator[tuple[tuple[int, ...], _Images]]:
-    """Grow sequences mirror by mirror, with the images of the sources behind each."""
+    """Yield sequences of mirrors, extended one by one, with the sources' images in each."""
     stack: list[tuple[tuple[int, ...], _Images]] = [((), np.empty((0, *sources.shape)))]
     while stack:
         sequence, images = stack.pop()
@@ -226,7 +226,7 @@ def _sequences(
 def within_reach(
     mirrors: Mirrors, sequence: tuple[int, ...], latest: Float[np.ndarray, "sources 3"]
 ) -> Bool[np.ndarray, " mirrors"]:
-    """Tell which mirrors the beams from the latest images may meet next (none is missed)."""
+    """Return which mirrors the beams from the latest images may meet next (conservative)."""
     heights = dot(latest[:, None] - mirrors.corners[None, :, 0], mirrors.normals)
     reflects = np.where(mirrors.two_sided, np.abs(heights), heights) > ON_PLANE
     if not sequence:
@@ -305,9 +305,10 @@ def _unfold(
     source: Int[np.ndarray, " pairs"],
     receiver: Int[np.ndarray, " pairs"],
 ) -> tuple[Int[np.ndarray, " paths"], Float[np.ndarray, "paths bounces 3"]]:
-    """Fold the line from the last image to the receiver back onto the mirrors.
+    """Return the points of reflection, by folding the line from the last image to the receiver.
 
-    Returns which pairs have a path, finite extents and sides respected, and its vertices.
+    Returns the indices of the pairs that have a path within the mirrors' extents and on their
+    reflecting sides, and its vertices.
     """
     kept = np.arange(len(source))
     points = receivers[receiver]
@@ -338,7 +339,7 @@ def _lifted(
     points: list[Float[np.ndarray, "paths 3"]],
     clearance: float,
 ) -> list[Float[np.ndarray, "paths 3"]]:
-    """Lift the vertices of paths off their mirrors."""
+    """Move the vertices of paths off their mirrors."""
     lifted = [points[0]]
     for mirror, before, here in zip(sequence, points[:-1], points[1:], strict=False):
         side = np.sign(mirrors.heights(before, mirror))
@@ -351,7 +352,7 @@ def _lifted(
 def _clear(
     lifted: list[Float[np.ndarray, "paths 3"]], blocked: Blocked
 ) -> Int[np.ndarray, " clear"]:
-    """Tell which paths meet nothing between their points."""
+    """Return the indices of the paths that are not blocked between their points."""
     clear = np.arange(len(lifted[0]))
     for start, end in pairwise(lifted):
         if clear.size:

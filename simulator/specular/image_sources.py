@@ -1,9 +1,9 @@
 r"""Legs of an echo over mirrors: an antenna's image in them illuminates a target.
 
-By the method of images, what an antenna sends over a sequence of plane mirrors arrives as if it
-came from its image, times the mirrors' reflection and the loss of their roughness. So the facets
-of a target seen over walls are summed like those in plain sight, from the images' places; finite
-mirrors and whatever stands in the way cut out parts of it.
+By the method of images, the wave of an antenna over a sequence of plane mirrors arrives as from
+its image, times the mirrors' reflection and the coherent loss of their roughness. So the facets of
+a target behind walls are summed like those in line of sight, from the images' positions, and
+restricted by the mirrors' finite extents and by occlusion.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,18 +21,18 @@ from simulator.specular.image_method import unfolded_chain
 from simulator.specular.path_field import Through, reflected_field
 
 MOST_LEGS = 10_000
-"""Most legs over mirrors: each is traced from every antenna, some 10 ms; minutes in all. [-]"""
+"""Most legs over mirrors: tracing one from every antenna takes some 10 ms; minutes in all. [-]"""
 
 PAIRS_AT_ONCE = 100_000
-"""Links times patches whose reflection is worked out in one go. [-]"""
+"""Links times patches whose reflection is computed in one batch. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leg:
-    """A way over mirrors; without any it is the direct one."""
+    """A leg over a sequence of mirrors; an empty sequence is the direct leg."""
 
     sequence: tuple[int, ...]  # mirrors from the antenna onward
-    turn: Float[np.ndarray, "3 3"]  # of directions
+    turn: Float[np.ndarray, "3 3"]  # orthogonal matrix that maps directions to the image's
     shift: Float[np.ndarray, " 3"]  # [m]
 
     @property
@@ -41,7 +41,7 @@ class Leg:
         return len(self.sequence)
 
     def image(self, group: AntennaGroup) -> AntennaGroup:
-        """Mirror antennas, with the direction in which they look."""
+        """Return the image of antennas: positions, aim and polarization mirrored."""
         if not self.sequence:
             return group
         pattern = AntennaPattern(
@@ -53,7 +53,7 @@ class Leg:
         return AntennaGroup(positions=places, pattern=pattern)
 
     def onward(self, mirrors: Mirrors, *sequence: int) -> "Leg":
-        """Go on over more mirrors."""
+        """Extend the leg by more mirrors."""
         leg = self
         for mirror in sequence:
             normal = mirrors.normals[mirror]
@@ -74,20 +74,20 @@ DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
 def legs_within_reach(
     mirrors: Mirrors, groups: Sequence[AntennaGroup], most: int
 ) -> tuple[Leg, ...]:
-    """Find the legs of one to so many mirrors that antennas' patterns reach.
+    """Find the legs over 1 to ``most`` mirrors that lie within antennas' patterns.
 
     Parameters
     ----------
     mirrors
-        All there are.
+        All mirrors of the scene.
     groups
-        Antennas; the leg must be in reach of one of them.
+        Antennas; a leg must be within the pattern of one group.
     most
         Most mirrors of a leg.
 
     Returns
     -------
-    In the order of their mirrors, each leg before those that go on from it.
+    In the order of their mirrors, each leg before those that extend it.
 
     Raises
     ------
@@ -123,16 +123,16 @@ def legs_within_reach(
 
 
 def _reflects(mirrors: Mirrors, mirror: int, image: AntennaGroup) -> bool:
-    """Tell whether an image is on the reflecting side of a mirror."""
+    """Return whether an image is on the reflecting side of a mirror."""
     heights = mirrors.heights(image.positions, mirror)
     return bool((np.abs(heights) if mirrors.two_sided[mirror] else heights).max() > 0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegReflection:
-    """What both legs' mirrors multiply to the sum over a patch, at its centre.
+    """Factor of both legs' mirrors in the sum over a patch, taken at the patch's centre.
 
-    Of the field that arrives there, the part along the image's field.
+    The component of the arriving field along the field of the antenna's image.
     """
 
     mirrors: Mirrors
@@ -146,7 +146,7 @@ class LegReflection:
         centres: Float[np.ndarray, "patches 3"],
         nodes: Float[np.ndarray, " nodes"],
     ) -> Complex[np.ndarray, "patches links nodes"]:
-        """Work it out for links between images."""
+        """Return the factor for links between images. [-]."""
         total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
         for leg, places, image, through in (
             (self.out, links.senders, links.sent.polarization, self.through[0]),

@@ -1,4 +1,4 @@
-r"""What travels along specular paths: polarization, reflection, roughness, spreading and delay.
+r"""Fields along specular paths: polarization, reflection, roughness, spreading and delay.
 
 The S-parameter of a path of length :math:`L` between isotropic ports is
 
@@ -25,11 +25,11 @@ from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import Chain
 
 SAMPLES_AT_ONCE = 1_000_000
-"""Paths times frequencies that are evaluated in one go: 16 MB for each complex quantity."""
+"""Paths times frequencies evaluated in one batch: 16 MB for each complex quantity. [-]"""
 
 PARALLEL = 1e-9
-"""Angle below which two directions are one: what is left across them is rounding (1e-16 of either,
-a ten-millionth of this). [rad]"""
+"""Angle below which two directions count as parallel; rounding (1e-16) is a ten-millionth of it.
+[rad]"""
 
 Through = tuple[tuple[Crossing, ...], ...]
 """The slabs on each leg of a path; empty: none on any."""
@@ -53,7 +53,7 @@ def reflected_field(
     at_place: Polarization | None = None,
     through: Through = (),
 ) -> Complex[np.ndarray, "paths freqs"]:
-    """Field received over the field sent, spreading and delay apart.
+    """Received over transmitted field, without spreading and delay.
 
     The product of all reflections, with the coherent loss of roughness, between the fields of
     both antennas.
@@ -67,15 +67,15 @@ def reflected_field(
     sent, received
         Polarizations of the antennas.
     at_place
-        In place of a receiver: the field of the antenna's image over the chain, of which the
-        part at the path's end is asked for.
+        In place of a receiver's polarization: that of the antenna's image over the chain, along
+        which the field at the path's end is taken.
     through
-        The slabs on each leg, the same for all paths; without, none are.
+        The slabs on each leg, the same for all paths; empty: none.
     """
     everything = slice(0, len(chain.lengths))
     if at_place is None:
         return _field(mirrors, chain, everything, frequencies, (sent, received), through)
-    # The image's ray goes on as the path ends.
+    # The image's ray has the direction of the path's last leg.
     image = Polarization(axis=at_place.axis, cross_polar=-at_place.cross_polar)
     return _field(mirrors, chain, everything, frequencies, (sent, image), through)
 
@@ -121,7 +121,7 @@ def _past(
     field: list[np.ndarray],
     vectors: list[np.ndarray],
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Take a field, given by two components, through the slabs on a leg."""
+    """Transmit a field, given by two components, through the slabs on a leg."""
     if not crossings:
         return field, vectors
     whole = field[0][..., None] * vectors[0][:, None] + field[1][..., None] * vectors[1][:, None]
@@ -134,7 +134,7 @@ def _past(
 
 
 def roughness_loss(phase: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    r"""Coherent amplitude off a rough mirror over that off a smooth one, :math:`e^{-2 g^2}`.
+    r"""Coherent reflection of a rough mirror relative to a smooth one, :math:`e^{-2 g^2}`. [-].
 
     For Gaussian heights, with :math:`g = k \sigma \cos\theta` in radians.
     """
@@ -160,7 +160,7 @@ def specular_response(
     Parameters
     ----------
     mirrors, chains
-        What :func:`simulator.specular.image_method.find_chains` was given and found.
+        Input and output of :func:`simulator.specular.image_method.find_chains`.
     frequencies
         Any grid. [Hz]
     shape
@@ -172,11 +172,11 @@ def specular_response(
     waves
         Spherical (S-parameters), or cylindrical (fields of unit line sources).
     slabs
-        What the chains cross sets of.
+        The slabs to which the chains' sets refer.
 
     Returns
     -------
-    S-parameters of all links; zero where no path leads. [-]
+    S-parameters of all links; zero for links without a path. [-]
     """
     response = np.zeros((*shape, frequencies.size), dtype=np.complex128)
     paths_at_once = max(1, SAMPLES_AT_ONCE // frequencies.size)
@@ -189,14 +189,14 @@ def specular_response(
                 field = _field(mirrors, chain, some, frequencies, (sent, received), through)
                 wave = direct_wave(chain.lengths[some], frequencies, waves=waves)
                 field *= gains[some, None] * wave
-                response[source[some], receiver[some]] += field  # no link twice: one path a chain
+                response[source[some], receiver[some]] += field  # no link occurs twice
     return response
 
 
 def _by_slabs(
     chain: Chain, slabs: Slabs | None
 ) -> Iterator[tuple[Int[np.ndarray, " paths"], Through]]:
-    """Sort a chain's paths by the slabs on each of their legs."""
+    """Group a chain's paths by the slabs on each of their legs."""
     if slabs is None or chain.crossed is None:
         yield np.arange(len(chain.lengths)), ()
         return
@@ -213,7 +213,7 @@ def _across(
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     substitute = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     substitute /= np.linalg.norm(substitute)
-    # Below that the cross product has lost its direction, and none is needed: TE is TM.
+    # Below, the cross product's direction is rounding, and not needed: TE and TM agree.
     return np.where(length > PARALLEL, across / np.maximum(length, PARALLEL), substitute)
 
 

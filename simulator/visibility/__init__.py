@@ -1,7 +1,7 @@
-"""Who sees whom: antennas and facets, facets and facets.
+"""Visibility between antennas and facets, and between facets.
 
-Whole beams are culled by shafts first; rays decide what is left. Only other bodies' mean surfaces
-block: a surface does not hide itself by its own roughness.
+Shafts decide for whole tiles first; rays are traced for the rest. Only the mean surfaces of other
+bodies block: a surface does not hide itself by its own roughness.
 """
 
 import lazy_loader

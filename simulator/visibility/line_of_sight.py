@@ -1,4 +1,4 @@
-"""The direct path from a user to each element: found by Sionna RT, measured in float64."""
+"""Line of sight from a user to each element, by Sionna RT."""
 
 import numpy as np
 import sionna.rt as rt
@@ -13,11 +13,11 @@ SHORTEST_LEG = 0.011
 def in_line_of_sight(
     rays: RayScene, user: Float[np.ndarray, " 3"], elements: Float[np.ndarray, "elements 3"]
 ) -> Bool[np.ndarray, " elements"]:
-    """Tell which elements see the user, by Sionna RT's deterministic path solver."""
+    """Return which elements see the user, by Sionna RT's deterministic path solver."""
     scene = rays.scene
     isotropic = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     scene.tx_array = scene.rx_array = isotropic
-    # No object's name holds a slash, so that these can never be one's.
+    # No object's name holds a slash, so these names cannot collide.
     scene.add(rt.Transmitter("/user", position=rays.about_centre(user).tolist()))
     names = [f"/element-{index}" for index in range(len(elements))]
     for name, element in zip(names, rays.about_centre(elements), strict=True):

@@ -1,4 +1,4 @@
-"""Which facets of two faces see each other: it depends neither on antennas nor on frequency."""
+"""Mutual visibility of the facets of two faces, independent of antennas and frequency."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ MOST_PAIRS = 2**30
 
 
 class Sight(NamedTuple):
-    """Facets of two faces that see each other alike."""
+    """Facets of two faces that see each other through the same set of slabs."""
 
     crossings: tuple[Crossing, ...]  # the slabs between them
     seen: Bool[np.ndarray, "one other"]
@@ -26,24 +26,24 @@ class Sight(NamedTuple):
 
 @dataclass(frozen=True)
 class MutualVisibility:
-    """Tells which facets of two faces see each other; each pair of faces is traced once."""
+    """Mutual visibility of facets of two faces; each pair of faces is traced once and cached."""
 
     rays: RayScene
     faces: Sequence[Face]  # whole
     slabs: Slabs = field(default_factory=no_slabs)
-    band: tuple[float, float] = (0.0, 0.0)  # that slabs have to let through [Hz]
+    band: tuple[float, float] = (0.0, 0.0)  # band over which slabs' transmission is judged [Hz]
     _traced: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
-    _sets: list[int] = field(default_factory=lambda: [0])  # of slabs, as they are met
+    _sets: list[int] = field(default_factory=lambda: [0])  # of slabs, in order of occurrence
 
     def __call__(self, one: Face, other: Face) -> Bool[np.ndarray, "one other"]:
-        """Look up some facets of two faces; points within a facet see what its centre sees."""
+        """Return it for some facets of two faces; a facet is represented by its centre."""
         return np.asarray(self._look_up(one, other) == 0)
 
     def sights(self, one: Face, other: Face) -> tuple[Sight, ...]:
-        """Tell which facets see each other past everything, and through which slabs.
+        """Return which facets see each other directly, and which through which slabs.
 
-        What lets less than :data:`simulator.materials.slab_insertion.LEAST_LEVEL` through is left
-        out; so are sights that no two facets have.
+        Slabs that transmit less than :data:`simulator.materials.slab_insertion.LEAST_LEVEL` are
+        left out; so are sets of slabs between no two facets.
         """
         through = self._look_up(one, other)
         found = []
@@ -86,7 +86,7 @@ class MutualVisibility:
         return numbers
 
     def _whole(self, part: Face) -> tuple[int, np.ndarray]:
-        """Which face it is a part of, and which facets of that face it has."""
+        """Return the index of the whole face of a part, and the part's facets in it."""
         index = next(
             index
             for index, face in enumerate(self.faces)
@@ -101,13 +101,13 @@ def facets_see_each_other(rays: RayScene, one: Face, other: Face) -> Bool[np.nda
     Parameters
     ----------
     rays
-        What may stand between them, themselves included.
+        The surfaces that may block, the two faces included.
     one, other
         The two faces.
 
     Returns
     -------
-    Whether both normals look to the other facet, and nothing is between.
+    Whether both facets face each other, and nothing is between.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which facets an antenna sees."""
+"""Result of a visibility test: the facets that antennas see."""
 
 from dataclasses import dataclass
 

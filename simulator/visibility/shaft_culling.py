@@ -1,10 +1,10 @@
-"""What antennas see of a scene in space: by shafts where nothing stands between, else by rays.
+"""Visibility of facets from antennas in 3-D: by shafts if nothing is between, else by rays.
 
 A shaft is the convex hull of all antennas and of a tile of facets (E. A. Haines and J. R. Wallace,
-"Shaft culling for efficient ray-cast radiosity", 1994, doi:10.1007/978-3-642-57963-9_10). Where a
-plane separates it from every other object, and the object's own facets all face the antennas, a
-ray would find nothing: none is traced. A surface does not hide itself by its own roughness: rays
-meet mean surfaces, and a convex one hides nothing of itself that faces the antennas.
+"Shaft culling for efficient ray-cast radiosity", 1994, doi:10.1007/978-3-642-57963-9_10). If planes
+separate it from every other object, and the object's own facets all face the antennas, they are
+visible, and no ray is traced. A surface does not hide itself by its own roughness: rays meet mean
+surfaces, and a convex one hides none of its facets that face the antennas.
 """
 
 import math
@@ -25,42 +25,42 @@ from simulator.geometry.ray_scene import RayScene, facets_visible
 from simulator.visibility.seen import Seen
 
 TILE = 0.05
-"""Side of the tiles that one shaft leads to. [m]"""
+"""Side of the tiles; each is tested by one shaft. [m]"""
 
 MARGIN = 6.0
-"""How far an object may stand out of its mean shape, over the rms of its heights. [-]"""
+"""Bound of an object's excursions from its mean shape, in rms heights. [-]"""
 
 GAP = 1e-5
-"""Least distance between a shaft and what does not touch it: rounding, and more. [m]"""
+"""Least distance between a shaft and an obstacle that counts as separated: above rounding. [m]"""
 
 PARALLEL = 1e-6
-"""Angle between a shaft and an edge below which they span no plane that could separate: then none
-is tried, and a ray is traced. [rad]"""
+"""Angle between a shaft and an edge below which they count as parallel, and span no separating
+plane: none is tried, and rays are traced. [rad]"""
 
 RAYS_AT_ONCE = 2**26
-"""Rays of which the answers are kept at one time: 64 MiB. [-]"""
+"""Rays whose results are held at one time: 64 MiB. [-]"""
 
 MOST_FACES = 64
-"""Faces of a mesh up to which each is an obstacle of its own; else its bounding box is one. [-]"""
+"""Most faces of a mesh whose faces are separate obstacles; beyond, its bounding box is one. [-]"""
 
 
 Shape = Literal["convex", "any"]
-"""Convex: hides none of its own that faces the antennas."""
+"""Convex: the object hides none of its own facets that face the antennas."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacle:
-    """A convex body that may stand between: the hull of its corners, and its planes' normals."""
+    """A convex body that may block: the hull of its corners, and its faces' normals."""
 
     owner: int  # the object it belongs to
     corners: Float[np.ndarray, "corners 3"]  # [m]
     axes: Float[np.ndarray, "axes 3"]  # unit vectors: normals of its faces
     edges: Float[np.ndarray, "edges 3"]  # unit vectors along its edges
-    margin: float  # by how much it may stand out [m]
+    margin: float  # bound of its roughness beyond the hull [m]
 
 
 def scenario_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
-    """Take each object of a scenario as one or more convex bodies."""
+    """Return the objects of a scenario, each as one or more convex bodies."""
     found = []
     for owner, surface in enumerate(mean_surfaces(scenario)):
         body = scenario.objects[surface.name]
@@ -74,7 +74,7 @@ def scenario_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
         if isinstance(body, Plate | Box):
             frame = np.stack([body.tangent, body.across, [0.0, 0.0, 1.0]])
         along = np.einsum("px,ax->pa", points, frame)
-        if isinstance(body, Cylinder):  # its lines round are chords
+        if isinstance(body, Cylinder):  # the mesh has chords, inside the circle
             margin += body.radius_m * (1 - math.cos(math.pi / FEWEST_ROUND))
         low, high = along.min(axis=0), along.max(axis=0)
         mask = np.array(np.meshgrid(*[[0, 1]] * 3, indexing="ij")).reshape(3, -1).T
@@ -91,7 +91,7 @@ def scenario_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
 
 
 def object_shape(scenario: Scenario, name: str) -> Shape:
-    """Tell how an object may hide parts of itself."""
+    """Return whether an object may hide facets of its own that face the antennas."""
     return "any" if isinstance(scenario.objects[name], MeshFile) else "convex"
 
 
@@ -115,7 +115,7 @@ def clear_shafts(
     radii: Float[np.ndarray, " tiles"],
     obstacles: Sequence[Obstacle],
 ) -> Bool[np.ndarray, " tiles"]:
-    """Tell between which tiles and all antennas surely none of the obstacles stands.
+    """Return for which tiles no obstacle is between them and any antenna (conservative).
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def clear_shafts(
     centres, radii
         Spheres around the tiles. [m]
     obstacles
-        What may stand between.
+        Bodies that may block.
     """
     clear = np.ones(len(centres), dtype=bool)
     middle = antennas.mean(axis=0)
@@ -156,7 +156,7 @@ def _separated(
     radii: Float[np.ndarray, " tiles"],
     obstacle: Obstacle,
 ) -> Bool[np.ndarray, " tiles"]:
-    """Tell for which tiles a plane across an axis lies between the shaft and the obstacle."""
+    """Return for which tiles a plane normal to an axis separates the shaft from the obstacle."""
     here = np.einsum("tx,ex->te", axes, ends)
     there = np.einsum("tx,tx->t", axes, centres)
     low = np.minimum(here.min(axis=1), there - radii)
@@ -170,7 +170,7 @@ def _separated(
 
 @dataclass
 class Sightlines:
-    """Tells which facets of a scene are seen over links; called with a block of facets."""
+    """Visibility of a scene's facets over links; called with a block of facets."""
 
     rays: RayScene
     facets: Facets
@@ -182,7 +182,7 @@ class Sightlines:
     traced: int = field(default=0, init=False)  # facets that rays were traced for
 
     def __call__(self, some: Int[np.ndarray, " some"]) -> Seen:
-        """Look at some facets."""
+        """Return the visibility of some facets."""
         clear = np.zeros(len(some), dtype=bool)
         owners = (
             np.zeros(len(some), dtype=np.int64)
@@ -196,7 +196,7 @@ class Sightlines:
         return self._trace(some, clear)
 
     def _clear(self, some: Int[np.ndarray, " some"], surface: int) -> Int[np.ndarray, " clear"]:
-        """Return which of one object's facets surely see all antennas."""
+        """Return which of one object's facets are visible to all antennas by shafts."""
         tiles = cut_into_patches(self.facets.part(some), np.arange(len(some)), TILE)
         others = [one for one in self.obstacles if one.owner != self.objects[surface]]
         clear = np.ones(tiles.count, dtype=bool)

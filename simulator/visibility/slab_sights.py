@@ -1,7 +1,8 @@
-"""Through which slabs antennas see facets in space: tile by tile, and ray by ray at silhouettes.
+"""Sets of slabs between antennas and facets in 3-D: by tiles, and by rays at slabs' silhouettes.
 
-A tile that a plane separates from a slab is not seen through it; one that all antennas see through
-the slab's inside is. Only for the others rays are crossed with the slab one by one.
+No ray to a tile crosses a slab if a plane separates the slab from the shaft; all do if the shaft
+passes within the slab's outline. Only for other tiles rays are intersected with the slab one by
+one.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from simulator.visibility.seen import Seen
 from simulator.visibility.shaft_culling import GAP, TILE, Obstacle, Sightlines, clear_shafts
 
 Pair = tuple[int, int]
-"""Sets of slabs on the way to a facet and back."""
+"""Sets of slabs on the leg to a facet and on the leg back."""
 
 MIXED = -1
 """Index of facets whose sets of slabs differ from antenna to antenna."""
@@ -29,16 +30,16 @@ LINES_AT_ONCE = 2**24
 
 @dataclass
 class SlabSights:
-    """Tells which of a scene's facets are seen through which slabs, over a sightlines' links."""
+    """Sets of slabs through which a scene's facets are seen, over the links of sightlines."""
 
     slabs: Slabs
     sightlines: Sightlines
-    chosen: Int[np.ndarray, " chosen"]  # facets that are asked about
-    convex: Sequence[int]  # faces of each object that none of its own facets is seen through
+    chosen: Int[np.ndarray, " chosen"]  # facets to be classified
+    convex: Sequence[int]  # sets of faces of each object that never hide its own facets
     pairs: list[Pair] = field(default_factory=list, init=False)  # that occur
 
     def __post_init__(self) -> None:
-        """Sort the facets by what they are seen through."""
+        """Group the facets by the sets of slabs through which they are seen."""
         self.pairs.append((0, 0))
         count = self.facets.count
         self._index = np.zeros(count, dtype=np.int16)
@@ -67,14 +68,14 @@ class SlabSights:
         return self.sightlines.facets
 
     def may_be(self, pair: Pair) -> Bool[np.ndarray, " facets"]:
-        """Tell which facets are seen over a pair of sets, from some antennas at least."""
+        """Return which facets are seen through a pair of sets, from at least one antenna."""
         chosen = np.zeros(self.facets.count, dtype=bool)
         index = self._index[self.chosen]
         chosen[self.chosen] = (index == self.pairs.index(pair)) | (index == MIXED)
         return chosen
 
     def over(self, pair: Pair, some: Int[np.ndarray, " some"]) -> Seen:
-        """Look at facets over a pair of sets of slabs only."""
+        """Return the visibility of facets through one pair of sets of slabs only."""
         seen = self.sightlines(some)
         index = self._index[some]
         alike, mixed = index == self.pairs.index(pair), index == MIXED
@@ -112,7 +113,7 @@ class SlabSights:
     def _by_rays(
         self, some: Int[np.ndarray, " some"]
     ) -> "list[tuple[np.ndarray, np.ndarray, np.ndarray]]":
-        """Cross rays from all antennas with all slabs: facets, and their sets over all links."""
+        """Return facets, and their sets over all links, by rays from all antennas to them."""
         count = len(self.sightlines.receivers)
         found = []
         for here in np.array_split(some, 1 + some.size * count // LINES_AT_ONCE):
@@ -136,7 +137,7 @@ class SlabSights:
         owner: Int[np.ndarray, " facets"],
         first: Int[np.ndarray, " tiles_and_one"],
     ) -> Int[np.ndarray, " tiles"]:
-        """Return the set of slabs that each tile is seen through; or that it is mixed."""
+        """Return the set of slabs through which each tile is seen; or :data:`MIXED`."""
         material = self.facets.material
         of_tile = np.zeros(len(centres), dtype=np.int64)
         if material is not None:
