@@ -1,7 +1,7 @@
 """Datasets: many samples of a varied scenario, by any number of workers, resumable.
 
 Sample n depends on the seed and n alone. Two stores of one configuration are equal byte for byte,
-whoever made which sample and in how many runs.
+whatever the number of workers and runs.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
 """Datasets: many samples of a varied scenario, made by any number of workers, resumable.
 
-The store does not depend on who made which sample, in what order, or in how many runs: two
-stores of one configuration are equal byte for byte.
+The store does not depend on the workers, their order or the number of runs: two stores of one
+configuration are equal byte for byte.
 """
 
 import os
@@ -40,10 +40,11 @@ from simulator.dataset.variables import FAILED
 from simulator.dataset.zarr_arrays import codec, failed_samples, stored_array
 
 Tally = Callable[[int, int, int], None]
-"""Told how many samples are done (the failed ones included), have failed, and there are in all."""
+"""Called with the numbers of samples done (failed ones included), failed, and in all."""
 
 COMPILING = 10.0
-"""Time of a first sample up to which the compilation of kernels (some seconds) may matter. [s]"""
+"""Longest time of a first sample of which kernel compilation (some seconds) may be a large part.
+[s]"""
 
 MOST_FAILURES_TOLD = 100
 
@@ -54,35 +55,35 @@ class Failure:
 
     sample: int
     reason: str
-    parameters: Mapping[str, object]  # as drawn; what it lacks is left out
+    parameters: Mapping[str, object]  # as drawn, without absent ones
 
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What a run has come to."""
+    """Result of a run."""
 
     samples: int
     failed: int
-    failures: tuple[Failure, ...]  # the first ones
+    failures: tuple[Failure, ...]  # the first few
     made_now: int  # samples that this run has made
-    seed: int  # of all that was drawn
+    seed: int  # of all random draws
 
 
 @dataclass(frozen=True, kw_only=True)
 class Forecast:
-    """What a dataset will cost, judged by one sample made on one thread of this machine."""
+    """Time, size and memory of a dataset, estimated from one sample on one thread here."""
 
     samples: int
     sample_seconds: float  # [s]
     sample_bytes: int  # compressed [byte]
     raw_bytes: int  # of echo and uplinks, uncompressed [byte]
     memory: int  # of one worker, at its peak [byte]
-    redraws: int  # draws of that sample that were impossible
+    redraws: int  # impossible draws of that sample
 
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetJob:
-    """A dataset to make: what, and where to."""
+    """A dataset to make: its configuration and its store."""
 
     source: ScenarioSource
     config: DatasetConfig
@@ -91,7 +92,7 @@ class DatasetJob:
 
     @property
     def space(self) -> SampleSpace:
-        """Its samples."""
+        """Sample space of the dataset."""
         return SampleSpace(self.source, self.config)
 
 
@@ -126,23 +127,23 @@ def make_dataset(
     retry_failed: bool = False,
     tell: Tally | None = None,
 ) -> Summary:
-    """Make a dataset, or go on with one that was begun.
+    """Make a dataset, or resume an unfinished one.
 
     Parameters
     ----------
     job
-        What and where to.
+        Configuration and store.
     workers
-        Who makes the samples. Those of another machine need the same folder and versions.
+        Where samples are made. Workers on other machines need the same folder and versions.
     retry_failed
         Make samples again that have failed earlier.
     tell
-        Told after each sample.
+        Called after each sample.
 
     Raises
     ------
     DatasetError
-        If something else is in the way, or another configuration's or version's dataset.
+        If the path holds something else, or a dataset of another configuration or version.
     WorkError
         If the workers are lost.
     """
@@ -169,18 +170,18 @@ def make_dataset(
 
 
 def forecast(job: DatasetJob) -> Forecast:
-    """Make one sample and judge by it what all will take; nothing is written."""
+    """Make one sample and estimate the cost of all from it; nothing is written."""
     layout = _layout(job)
     space = job.space
     compute_in_one_thread()
     row, seconds = _timed(space, layout)
-    if seconds < COMPILING:  # the first one has also compiled the kernels
+    if seconds < COMPILING:  # the first one included compilation of the kernels
         row, seconds = _timed(space, layout)
     packed = 0
     for variable in layout.variables:
         if variable.large:
             packed += _compressed_size(variable, row[variable.key])
-    # Labels pack well, but they are few: counted as they are.
+    # Labels compress well, but they are few: counted uncompressed.
     labels = sum(row[one.key].nbytes for one in layout.variables if not one.large)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return Forecast(
@@ -194,7 +195,7 @@ def forecast(job: DatasetJob) -> Forecast:
 
 
 def progress_of(job: DatasetJob) -> tuple[int, int]:
-    """Return how many samples of an interrupted dataset are done, and how many there will be."""
+    """Return the numbers of samples done and in all of an interrupted dataset."""
     growing = GrowingDataset(job.target, _layout(job))
     if job.target.exists() or not (growing.folder / "samples").exists():
         return 0, growing.layout.samples
@@ -202,7 +203,7 @@ def progress_of(job: DatasetJob) -> tuple[int, int]:
 
 
 def make_sample(job: DatasetJob, sample: int) -> bool:
-    """Make one sample and keep it, in a worker; return whether it failed."""
+    """Make one sample and write its file, in a worker; return whether it failed."""
     space, growing = _prepared(job)
     row = make_row(space, growing.layout, sample)
     growing.put(sample, row)
@@ -210,7 +211,7 @@ def make_sample(job: DatasetJob, sample: int) -> bool:
 
 
 def collect_block(job: DatasetJob, block: int) -> None:
-    """Put a block of samples into the store, in a worker."""
+    """Move a block of samples into the store, in a worker."""
     _, growing = _prepared(job)
     growing.collect(block)
 
@@ -242,19 +243,19 @@ def _prepared(job: DatasetJob) -> tuple[SampleSpace, GrowingDataset]:
 def _grow(
     job: DatasetJob, growing: GrowingDataset, workers: Workers, retry_failed: bool, tell: Tally
 ) -> int:
-    """Make what is missing; return how many samples that were."""
+    """Make the missing samples; return their number."""
     if os.path.lexists(job.target):
         _refuse_foreign(job, growing.layout)
         again = retry_failed and any(True for _ in failed_samples(job.target))
         if not again and not growing.folder.exists():
-            return 0  # where nothing may be written, too
+            return 0  # also if the folder is read-only
     with growing.locked():
-        # Looked at once nobody else makes it any more.
+        # Checked under the lock, when no other process works on it.
         finished = os.path.lexists(job.target)
         if finished:
             _refuse_foreign(job, growing.layout)
             if not retry_failed or not growing.reopen():
-                growing.discard()  # left by a retry that had hardly begun
+                growing.discard()  # left by a retry that was interrupted at its start
                 return 0
         growing.begin()
         if retry_failed and not finished:
@@ -316,7 +317,7 @@ def _collect(job: DatasetJob, block: int) -> Task:
 def _refuse_foreign(job: DatasetJob, layout: Layout) -> None:
     try:
         attributes: Mapping[str, Any] = zarr.open_group(job.target, mode="r").attrs.asdict()
-    except Exception:  # whatever else lies there
+    except Exception:  # whatever else the file holds
         attributes = {}
     if "dataset_format" not in attributes:
         raise DatasetError(

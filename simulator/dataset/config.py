@@ -15,11 +15,11 @@ from scenes.schema.errors import ScenarioError
 from simulator.dataset.provenance import code_digest, package_versions
 
 FORMAT = 1
-"""Of datasets: what is stored how."""
+"""Version of the format of datasets. [-]"""
 
 
 class DatasetConfig(Variations):
-    """What a dataset's TOML file holds."""
+    """Contents of a dataset's TOML file."""
 
     precision: Literal["single", "double"] = Field(
         "single", description="'single' (complex64) or 'double' (complex128) for echo and uplink"
@@ -30,12 +30,12 @@ class DatasetConfig(Variations):
 
 
 def identity(space: SampleSpace) -> dict[str, str]:
-    """Return what a dataset's bytes depend on; two that differ must not be mixed.
+    """Return all that a dataset's bytes depend on; samples of different ones must not be mixed.
 
     Returns
     -------
-    ``config`` (JSON), ``base`` (the base scenario as TOML; of files its digest), ``versions``
-    (JSON) and ``code`` (a digest of ours).
+    ``config`` (JSON), ``base`` (the base scenario as TOML; files by their digest), ``versions``
+    (JSON) and ``code`` (a digest of the packages' code).
 
     Raises
     ------
@@ -51,7 +51,7 @@ def identity(space: SampleSpace) -> dict[str, str]:
 
 
 def content_text(tables: dict[str, Any]) -> str:
-    """Write a scenario's tables as TOML that tells what is in their files, not where they are.
+    """Write a scenario's tables as TOML, with digests of their files in place of paths.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def content_text(tables: dict[str, Any]) -> str:
 
 
 def differences(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
-    """Say in which parts two identities differ; of configurations, in which keys."""
+    """Return the parts in which two identities differ; of configurations, the keys."""
     found = []
     for part in sorted({*one, *other}):
         if one.get(part) == other.get(part):

@@ -1,9 +1,9 @@
-"""The layout of a dataset: which variables there are, with what dimensions, units and padding.
+"""The layout of a dataset: its variables, their dimensions, units and padding.
 
-That of the measurement file with a leading dimension ``sample``. What differs in length from
-sample to sample has room for the longest: rows that a sample lacks hold NaN (-1 among whole
-numbers, "" among texts), and a count says how many there are. Users, walls and targets keep
-their row, and so their name, in all samples.
+It is that of the measurement file with a leading dimension ``sample``. Variables whose length
+differs among samples are padded to the longest with NaN (-1 among integers, "" among texts), and a
+count gives the number of valid rows. Users, walls and targets keep their row, and so their name, in
+all samples.
 """
 
 from collections.abc import Mapping
@@ -31,18 +31,18 @@ from simulator.dataset.variables import (
 )
 
 BLOCK_BYTES = 32 * 2**20
-"""Most bytes of raw samples that lie in one file (a shard), unless a sample itself is larger."""
+"""Most bytes of raw samples in one file (a shard), unless one sample is larger. [byte]"""
 
 BLOCK_SAMPLES = 256
-"""Most samples in one such file."""
+"""Most samples in one such file. [-]"""
 
 LABEL_SAMPLES = 4096
-"""Samples in one file of a label: a million samples are 245 files for each of some 30 labels."""
+"""Samples in one file of a label: a million samples are 245 files for each of 30 labels. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Everything about a dataset but its samples."""
+    """Structure of a dataset: everything but its samples."""
 
     samples: int
     variables: tuple[Variable, ...]
@@ -80,19 +80,19 @@ class Layout:
 
 
 def dataset_layout(space: SampleSpace, config: DatasetConfig, example: Scenario) -> Layout:
-    """Lay a dataset out.
+    """Return the layout of a dataset.
 
     Parameters
     ----------
     space, config
-        Its samples, and what was asked for.
+        Its samples, and its configuration.
     example
-        Any sample's scenario; what does not vary is taken from it.
+        Scenario of any sample; supplies what does not vary.
 
     Raises
     ------
     ScenarioError
-        If samples would differ in what a dataset has once.
+        If a quantity would vary that a dataset stores once for all samples.
     """
     for key in ("waves", "dimensions", "format", "name"):
         if space.varies(key):
@@ -205,7 +205,7 @@ def _attributes(
 
 
 def fits(layout: Layout, measurement: Measurement) -> bool:
-    """Tell whether a measurement has room in the layout."""
+    """Return whether a measurement fits into the layout."""
     shapes = [one.samples.shape for one in measurement.uplinks]
     shapes += [measurement.echo.samples.shape] if measurement.echo else []
     return all(shape[0] <= layout.elements and shape[1] <= layout.frequencies for shape in shapes)

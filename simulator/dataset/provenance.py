@@ -1,6 +1,6 @@
-"""What made a result: the versions of the packages and a digest of our own code.
+"""Provenance of a result: versions of packages and a digest of our own code.
 
-Two samples belong into one dataset only if both were made by the same.
+Samples may be in one dataset only if these agree.
 """
 
 import functools
@@ -20,12 +20,12 @@ PACKAGES = (
     "sionna-rt",
     "trimesh",
 )
-"""Those whose version may change a simulated sample."""
+"""Packages whose version may change a simulated sample."""
 
 
 @functools.cache
 def package_versions() -> dict[str, str]:
-    """Return the versions of :data:`PACKAGES`; an empty one where a package is not installed."""
+    """Return the versions of :data:`PACKAGES`; empty if a package is not installed."""
     found = {}
     for package in PACKAGES:
         try:
@@ -39,14 +39,14 @@ def package_versions() -> dict[str, str]:
 def code_digest(
     packages: tuple[str, ...] = ("scenes", "simulator"), endings: tuple[str, ...] = (".py",)
 ) -> str:
-    """Return a digest of all Python code of some of our packages: between releases it changes too.
+    """Return a digest of the Python code of some packages, which may change between releases.
 
     Parameters
     ----------
     packages
         Their names.
     endings
-        Of the files that count: code alone, or data that lie beside it as well.
+        File name endings to include: code alone, or also data files of the packages.
     """
     digest = hashlib.sha256()
     for package in packages:

@@ -32,8 +32,8 @@ def make_row(space: SampleSpace, layout: Layout, sample: int) -> Row:
 
     Returns
     -------
-    The row. Where the sample cannot be made, its status says so, ``failure`` says why, and the
-    parameters are those that were drawn last.
+    The row. If the sample cannot be made, its status is :data:`FAILED`, ``failure`` holds the
+    reason, and the parameters are those of the last draw.
     """
     attempt = Attempt(values={}, scenario=None)
     problem, redraws = "", 0
@@ -43,7 +43,7 @@ def make_row(space: SampleSpace, layout: Layout, sample: int) -> Row:
             continue
         try:
             return _made(space, layout, sample, attempt, attempt.scenario, redraws)
-        except ScenarioError as error:  # such as a scene of which nothing is received
+        except ScenarioError as error:  # for instance, nothing is received
             problem = str(error)
         except Exception as error:
             return failed_row(space, layout, sample, f"{type(error).__name__}: {error}", attempt)
@@ -61,9 +61,9 @@ def failed_row(
     space, layout, sample
         As in :func:`make_row`.
     why
-        What went wrong; its first line is kept.
+        The error message; its first line is kept.
     attempt
-        The draw at which it did; None: the first possible one, or the last.
+        The draw that failed; None: the first possible one, or the last.
     """
     if attempt is None:
         for attempt in space.attempts(sample):

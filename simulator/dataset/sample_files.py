@@ -1,4 +1,4 @@
-"""Rows of a dataset in files of their own: each there whole, or not at all."""
+"""Rows of a dataset in files of their own, written atomically."""
 
 import os
 import zipfile
@@ -12,10 +12,10 @@ from simulator.dataset.sample import Row
 
 
 def save_row(path: Path, row: Row) -> None:
-    """Write arrays aside, flush them to the disk, and give them their name."""
+    """Write arrays to a temporary file, flush it to the disk, and rename it."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     plain: dict[str, Any] = {
-        # NumPy's files know no variable-length strings, and a pickle is read nowhere here.
+        # NumPy files hold no variable-length strings except as pickles, which are never read here.
         key: np.array(values.tolist(), dtype=np.str_) if values.dtype.kind == "T" else values
         for key, values in row.items()
     }
@@ -30,13 +30,13 @@ def save_row(path: Path, row: Row) -> None:
 
 
 def load_row(path: Path, only: tuple[str, ...] | None = None) -> Row:
-    """Read arrays, all of a file or only some. Nothing pickled is read."""
+    """Read all or some arrays of a file; pickled objects are refused."""
     with np.load(path, allow_pickle=False) as held:
         return {key: held[key] for key in (only or held.files)}
 
 
 def is_whole(path: Path) -> bool:
-    """Tell whether a file was written to its end, by its checksums."""
+    """Return whether a file is complete, by its checksums."""
     try:
         with zipfile.ZipFile(path) as held:
             return held.testzip() is None
@@ -45,7 +45,7 @@ def is_whole(path: Path) -> bool:
 
 
 def numbers_in(folder: Path) -> Iterator[int]:
-    """Yield the numbers by which a folder's files are called, in any order."""
+    """Yield the numbers that are the names of a folder's files, in any order."""
     with os.scandir(folder) as entries:
         for entry in entries:
             stem, _, suffix = entry.name.partition(".")
@@ -54,7 +54,7 @@ def numbers_in(folder: Path) -> Iterator[int]:
 
 
 def flush(path: Path) -> None:
-    """Have a file, or all below a folder, on the disk before anything says that it is."""
+    """Flush a file, or all files below a folder, to the disk (fsync)."""
     for one in [path, *path.rglob("*")] if path.is_dir() else [path]:
         if one.is_file():
             with one.open("rb") as file:

@@ -1,6 +1,6 @@
-"""A dataset on disk while it is made: every file is complete or absent, and work can resume.
+"""An unfinished dataset on disk: every file is complete or absent, and work can resume.
 
-Beside ``FILE.zarr`` lies ``FILE.zarr.unfinished`` until all samples are there::
+The folder ``FILE.zarr.unfinished`` is beside ``FILE.zarr`` until all samples are done::
 
     dataset.json        what is being made; another configuration or version is refused
     samples/N.npz       one file for each sample that is done
@@ -35,11 +35,11 @@ IDENTITY = ("config", "base", "versions", "code")
 
 
 OURS = frozenset({JOB, f"{JOB}.part", "store", "store.part", "samples", "blocks", "lock"})
-"""All that may lie in the folder, at whatever moment the process was killed."""
+"""All names that may be in the folder, whenever the process was killed."""
 
 
 class DatasetError(ValueError):
-    """A dataset cannot be written or taken up; the message says why and what to do."""
+    """A dataset cannot be written or resumed; the message says why and what to do."""
 
 
 class GrowingDataset:
@@ -51,15 +51,15 @@ class GrowingDataset:
         self.folder = target.with_name(target.name + ".unfinished")
         self.store = self.folder / "store"
 
-    # What has to be there
+    # Start and end
 
     def begin(self) -> None:
-        """Make the folder, or take it up: what is torn is removed, what is done stays.
+        """Create the folder, or resume in it: partial files are removed, complete ones kept.
 
         Raises
         ------
         DatasetError
-            If something else lies there, or a dataset of another configuration or version.
+            If the folder holds something else, or a dataset of another configuration or version.
         """
         if (self.folder / JOB).is_file() and self.store.exists():
             self._refuse_another(json.loads((self.folder / JOB).read_text(encoding="utf-8")))
@@ -69,14 +69,14 @@ class GrowingDataset:
         making = self.folder / "store.part"
         create_store(making, self.layout)
         self._write_job()
-        making.rename(self.store)  # last: until then, whoever comes starts anew
+        making.rename(self.store)  # last: before this, a new process starts anew
 
     def reopen(self) -> tuple[int, ...]:
-        """Turn the finished dataset into an unfinished one that lacks its failed samples.
+        """Turn the finished dataset into an unfinished one without its failed samples.
 
         Returns
         -------
-        The samples that are to be made again; none: nothing was changed.
+        The samples to be made again; if none, nothing was changed.
         """
         failed = tuple(failed_samples(self.target))
         if not failed:
@@ -96,12 +96,12 @@ class GrowingDataset:
         return failed
 
     def discard(self) -> None:
-        """Remove the folder, but for the lock: the dataset itself is whole."""
+        """Remove the folder except the lock, when the dataset itself is complete."""
         for name in OURS - {"lock"}:
             _remove(self.folder / name)
 
     def forget_failed(self) -> None:
-        """Have the failed samples of the unfinished dataset made again."""
+        """Delete the failed samples of the unfinished dataset, so that they are made again."""
         for sample in self.staged():
             if int(self._staged_row(sample)["status"]) == FAILED:
                 self._sample_file(sample).unlink()
@@ -117,7 +117,7 @@ class GrowingDataset:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep others from the folder; the lock ends with the process, however that ends.
+        """Lock the folder against other processes; the lock is released when the process ends.
 
         Raises
         ------
@@ -134,13 +134,13 @@ class GrowingDataset:
                 yield
             finally:
                 if {one.name for one in self.folder.iterdir()} <= {"lock"}:
-                    # All is done, or nothing was begun. The lock last: whoever comes now must
-                    # not find anything of ours.
+                    # All is done, or nothing was begun. The lock goes last: a process that
+                    # comes now must find an empty folder.
                     (self.folder / "lock").unlink(missing_ok=True)
                     with suppress(OSError):
                         self.folder.rmdir()
 
-    # What is done
+    # Progress
 
     def staged(self) -> list[int]:
         """Return the samples that are done, but not in the store yet."""
@@ -151,7 +151,7 @@ class GrowingDataset:
         return sorted(numbers_in(self.folder / "blocks"))
 
     def done(self) -> np.ndarray:
-        """Tell for every sample whether it is done. [bool]."""
+        """Return for every sample whether it is done. [bool]."""
         done = np.zeros(self.layout.samples, dtype=bool)
         done[self.staged()] = True
         for block in self.collected():
@@ -168,16 +168,16 @@ class GrowingDataset:
             found += [start + int(at) for at in np.flatnonzero(status == FAILED)]
         return sorted(found)
 
-    # What workers do
+    # For workers
 
     def put(self, sample: int, row: Row) -> None:
-        """Keep a sample's row."""
+        """Write a sample's row to its file."""
         save_row(self._sample_file(sample), row)
 
     def collect(self, block: int) -> None:
         """Move all samples of a block from their files into the store.
 
-        Done again, after a worker was killed over it, it goes on where that one was.
+        If a worker is killed meanwhile, the next call resumes where it was.
         """
         samples = self.layout.block_samples(block)
         if self._block_file(block).exists():  # written last: the store holds the block
@@ -196,7 +196,7 @@ class GrowingDataset:
         self._unstage(samples)
 
     def finish(self) -> None:
-        """Write the labels into the store, and put it where it belongs."""
+        """Write the labels into the store, and rename it to its final name."""
         group = zarr.open_group(self.store, mode="r+")
         per_chunk = LABEL_SAMPLES // self.layout.block
         small = [one for one in self.layout.variables if not one.large]
@@ -210,11 +210,11 @@ class GrowingDataset:
                 array[start : start + len(values)] = _as_stored(variable, values)
         for variable in small:
             flush(self.store / variable.key)
-        self._clear_partial()  # of workers that were killed on the way
+        self._clear_partial()  # of workers that were killed
         rename_new(self.store, self.target)
         self.discard()
 
-    # Its own files
+    # Files of the folder
 
     def _sample_file(self, sample: int) -> Path:
         return self.folder / "samples" / f"{sample}.npz"
@@ -248,7 +248,7 @@ class GrowingDataset:
             )
 
     def _start_anew(self) -> None:
-        """Remove what was begun before there was a store, or is held by the finished one."""
+        """Remove files from before the store was made, and those that the finished one replaces."""
         self.folder.mkdir(parents=True, exist_ok=True)
         if foreign := sorted({one.name for one in self.folder.iterdir()} - OURS):
             raise DatasetError(
@@ -260,7 +260,7 @@ class GrowingDataset:
             (self.folder / name).mkdir()
 
     def _clear_torn(self) -> None:
-        """Remove what a process left behind that ended in the middle of something."""
+        """Remove partial files of a process that was killed."""
         for folder in (self.folder, self.folder / "samples", self.folder / "blocks"):
             folder.mkdir(exist_ok=True)
             for entry in folder.iterdir():
@@ -312,7 +312,7 @@ def _read_row(store: Path, layout: Layout, sample: int) -> Row:
 
 
 def _only(values: np.ndarray) -> np.ndarray:
-    """Take the leading dimension away; of texts too, which an index would turn into `str`."""
+    """Remove the leading dimension; for texts, an index would return `str`, not an array."""
     return values.reshape(values.shape[1:])
 
 

@@ -1,7 +1,7 @@
-"""Tasks worked off by Dask, or in this process: a window of them at a time, so memory stays flat.
+"""Execution of tasks by Dask or in this process, a limited number at a time to bound memory.
 
-What is done is known by its files, not by this module: a run that is stopped is taken up again by
-submitting what is missing. A worker that dies is replaced, and its task given to another.
+This module keeps no record of what is done: files do, and an interrupted run resumes by submitting
+the missing tasks. A worker that dies is replaced, and its task given to another.
 """
 
 import functools
@@ -15,20 +15,20 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 PATIENCE = 60.0
-"""How long a scheduler that somebody else started may have no worker. [s]"""
+"""Time for which an external scheduler may have no worker. [s]"""
 
 CONNECTING = 10.0
-"""How long a scheduler may take to answer. [s]"""
+"""Timeout of the connection to a scheduler. [s]"""
 
 STARTING = "1 hour"
-"""How long a worker of this machine that has died may take to start again: it may be busy."""
+"""Time that a dead worker of this machine may take to restart, also when the machine is busy."""
 
 DEATHS = 5
-"""How many workers may die over one task before it counts as failed."""
+"""Number of workers that may die while at one task before it counts as failed. [-]"""
 
 
 class WorkError(RuntimeError):
-    """The work cannot go on; the message says why, and what to do."""
+    """The work cannot continue; the message says why, and what to do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,17 +42,17 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True)
 class Workers:
-    """Where tasks are worked off.
+    """Where tasks are executed.
 
     Processes of this machine, those of a Dask scheduler, or (``processes`` = 0) this process.
     """
 
     processes: int = 0
-    scheduler: str | None = None  # its address, before which processes do not count
+    scheduler: str | None = None  # its address; then ``processes`` is ignored
 
     @property
     def in_this_process(self) -> bool:
-        """Whether nothing is started."""
+        """Whether tasks run in this process, and no worker is started."""
         return self.scheduler is None and self.processes == 0
 
 
@@ -66,22 +66,22 @@ def work_off(
     workers: Workers,
     on_result: Callable[[Task, Result], Iterable[Task]],
 ) -> None:
-    """Work tasks off; this process only hands them out and looks at their results.
+    """Execute tasks; with workers, this process only submits them and handles their results.
 
     Parameters
     ----------
     tasks
         Taken one by one as workers become free.
     workers
-        Who does them. Each process is told to compute in one thread.
+        Where they run. Each process computes in one thread.
     on_result
-        Told each result, in the order in which they come; returns tasks that are now possible.
-        An exception that it raises ends the work.
+        Called with each result, in order of completion; returns tasks that are now possible. An
+        exception that it raises ends the work.
 
     Raises
     ------
     WorkError
-        If the scheduler cannot be reached, has no workers, or is lost on the way.
+        If the scheduler cannot be reached, has no workers, or is lost meanwhile.
     """
     queue = _Queue(iter(tasks))
     if workers.in_this_process:
@@ -114,7 +114,7 @@ def work_off(
 
 
 class _Queue:
-    """Tasks to come: those that became possible on the way first."""
+    """Queue of tasks: those that became possible during the run go first."""
 
     def __init__(self, tasks: Iterator[Task]) -> None:
         self._tasks = tasks
@@ -148,7 +148,7 @@ def _outcome(future: Any) -> Result:
 
 
 def _window(client: Any) -> int:
-    # Two for each thread: one in work, one at hand.
+    # Two for each thread: one running, one waiting.
     threads: int = sum(client.nthreads().values())
     return 2 * max(threads, 1)
 
@@ -161,15 +161,15 @@ def _client(workers: Workers) -> Iterator[Any]:
     _quieten()
     settings = {
         "distributed.scheduler.allowed-failures": DEATHS,
-        # A paused worker never goes on where the memory is not its tasks' to free.
+        # No pausing by memory: a paused worker never resumes if its tasks cannot free the memory.
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.admin.log-length": 100,
         "distributed.admin.low-level-log-length": 100,
-        # Else a worker that needs longer to start again is given up, until there is none.
+        # Otherwise workers that restart slowly are given up one by one.
         "distributed.deploy.lost-worker-timeout": STARTING,
-        # Nothing is told to whoever asks the ports that cannot be left closed.
+        # Some ports cannot be closed; they answer no requests.
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
     }
@@ -184,11 +184,11 @@ def _client(workers: Workers) -> Iterator[Any]:
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
-                # Who may submit a task runs code as us, and any user of this machine reaches the
-                # port: both ends must show a certificate that is made here and kept in memory.
+                # A client that may submit a task runs code as this user, and any user of the
+                # machine reaches the port: both ends need a certificate, kept in memory.
                 security=distributed.Security.temporary(),
                 dashboard_address=None,
-                # Without a dashboard, too, it serves its health, else at a port that may be taken.
+                # Even without a dashboard it serves its health; the default port may be in use.
                 scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                 silence_logs=logging.CRITICAL,
                 preload=[__name__],
@@ -207,7 +207,7 @@ def _connected(address: str) -> Iterator[Any]:
             f"--scheduler {address}: cannot be reached ({type(error).__name__}); give the address "
             "that `dask scheduler` prints, such as tls://10.0.0.1:8786"
         ) from error
-    except TypeError as error:  # what Dask says where a certificate is missing
+    except TypeError as error:  # raised by Dask if a certificate is missing
         raise WorkError(
             f"--scheduler {address}: Dask has no certificate for it ({error}); name yours in "
             "Dask's configuration, distributed.comm.tls, as docs/how_to/cluster.md says"
@@ -224,7 +224,7 @@ def _connected(address: str) -> Iterator[Any]:
 
 
 def _distributed() -> Any:
-    # Its own annotations are half finished; and only those that need it wait for it.
+    # Dask's annotations are incomplete; imported here, because it is slow and rarely needed.
     return importlib.import_module("distributed")
 
 
@@ -250,7 +250,7 @@ def dask_setup(worker: Any) -> None:
 
 @functools.cache
 def compute_in_one_thread() -> None:
-    """Compute in one thread: Dr.Jit takes all cores in every worker else."""
+    """Compute in one thread; by default Dr.Jit takes all cores in every worker."""
     from estimator.compute import engine
 
     if engine.backend() == "llvm":

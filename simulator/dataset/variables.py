@@ -1,4 +1,4 @@
-"""The variables of a dataset: their dimensions, types, units and what they say."""
+"""The variables of a dataset: dimensions, types, units and descriptions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,15 +12,15 @@ from scenes.scenario import Scenario
 from simulator.dataset.config import DatasetConfig
 
 MADE, FAILED = 0, 1
-"""Status of a sample."""
+"""Status of a sample. [-]"""
 
 TEXT = "text"
-"""Type of variables of variable-length strings."""
+"""Data type of variables that hold strings of variable length."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable that every sample has a value of."""
+    """A variable with one value or array for each sample."""
 
     name: str
     group: str = ""  # "": the root
@@ -37,12 +37,12 @@ class Variable:
 
     @property
     def missing(self) -> Any:
-        """Value where a sample has none."""
+        """Fill value for absent entries."""
         kind = "U" if self.type == TEXT else np.dtype(self.type).kind
         return {"f": np.nan, "c": complex("nan+nanj"), "i": -1, "U": ""}[kind]
 
     def empty(self) -> np.ndarray:
-        """Return the values of a sample that has none."""
+        """Return an array of fill values for one sample."""
         if self.type == TEXT:
             return np.full(self.shape, "", dtype=np.dtypes.StringDType())
         return np.full(self.shape, self.missing, dtype=self.type)
@@ -110,7 +110,7 @@ def signal_variables(
 
 
 def status_variables() -> list[Variable]:
-    """Return what says how a sample came about."""
+    """Return the variables on how a sample was made: status, draws, failure."""
     return [
         Variable(
             name="status",
@@ -133,7 +133,7 @@ def status_variables() -> list[Variable]:
 def geometry_variables(
     example: Scenario, elements: int, points: int, *, fixed_array: bool, fixed_band: bool
 ) -> list[Variable]:
-    """Return where elements and frequencies are, if that differs from sample to sample."""
+    """Return elements' positions and frequencies, if they vary from sample to sample."""
     found = []
     if not fixed_array:
         names = [("aperture_position", "position"), ("element_position", "element")]
@@ -169,7 +169,7 @@ def geometry_variables(
 
 
 def label_variables(users: int, walls: int, targets: int, paths: int) -> list[Variable]:
-    """Return the truth of users, walls, targets and paths, as many as the most of any sample."""
+    """Return the truth of users, walls, targets and paths, sized for the largest sample."""
     metres, radians = {"units": "m"}, {"units": "rad"}
 
     def points(name: str, of: str, count: int, told: str) -> Variable:
@@ -282,7 +282,7 @@ def label_variables(users: int, walls: int, targets: int, paths: int) -> list[Va
 
 
 def parameter_variables(space: SampleSpace) -> list[Variable]:
-    """Return what was drawn."""
+    """Return the drawn parameters."""
     found = []
     for one in space.parameters:
         attributes = {"long_name": one.key} | ({} if one.unit is None else {"units": one.unit})

@@ -1,4 +1,4 @@
-"""The Zarr arrays of a dataset: how they are laid out, chunked and compressed."""
+"""The Zarr arrays of a dataset: layout, chunks and compression."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,14 +13,14 @@ from simulator.dataset.variables import FAILED, TEXT, Variable
 
 
 def create_store(path: Path, layout: Layout) -> None:
-    """Write an empty dataset: all metadata, and what is the same in all samples.
+    """Write an empty dataset: all metadata, and the variables common to all samples.
 
     Parameters
     ----------
     path
         A folder that does not exist yet.
     layout
-        What it will hold.
+        Of the dataset.
     """
     root = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
     names = {one.group for one in layout.variables} | {one.group for one in layout.constants}
@@ -58,10 +58,10 @@ def stored_array(group: zarr.Group, key: str) -> zarr.Array[Any]:
 
 
 def codec(variable: Variable) -> BloscCodec:
-    """Return how a large variable is compressed.
+    """Return the codec of a large variable.
 
-    The bytes of a number are sorted by their weight first: signs and exponents are alike, the
-    rest of a noisy sample is not. Losslessly, some 10 % is all there is to gain.
+    Bytes are shuffled by significance first: signs and exponents compress, the mantissas of noisy
+    samples do not. Lossless compression saves some 10 %.
     """
     part = np.dtype(variable.type).itemsize // 2
     return BloscCodec(cname="zstd", clevel=3, shuffle="shuffle", typesize=part)

@@ -1,7 +1,7 @@
-"""Facets, patches, mean planes and rays: the geometry that fields are computed on.
+"""Facets, patches, mean planes and rays: the geometry on which fields are computed.
 
-Frozen surfaces are cut into facets; their mean surfaces are what reflects specularly and what
-blocks rays. Lengths are computed in double precision: at 300 GHz a micrometre is 0.4°.
+Frozen surfaces are divided into facets; their mean surfaces reflect specularly and block rays.
+Lengths are computed in double precision: at 300 GHz a micrometre is 0.4° of phase.
 """
 
 import lazy_loader

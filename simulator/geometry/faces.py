@@ -16,17 +16,17 @@ class Face:
     """One side of a surface of line facets."""
 
     centres: Float[np.ndarray, "facets 2"]  # [m]
-    places: Float[np.ndarray, "facets 2"]  # where rays start, on the mean surface [m]
+    places: Float[np.ndarray, "facets 2"]  # starts of rays, on the mean surface [m]
     normals: Float[np.ndarray, "facets 2"]  # unit vectors, to the side that scatters
-    sizes: Float[np.ndarray, " facets"]  # what each stands for in a sum over the surface [m]
+    sizes: Float[np.ndarray, " facets"]  # weight of each facet in a sum over the surface [m]
     edges: Float[np.ndarray, "facets 2"]  # [m]
     source: Int[np.ndarray, " facets"]  # index of each facet in the whole set
-    surface: int  # which object the face belongs to
-    side: int  # 1: outer, or first; -1: the back of an open surface
+    surface: int  # index of the face's object
+    side: int  # 1: the outer or first side; -1: the back of an open surface
     material: Material
-    rough: Bool[np.ndarray, " facets"]  # their normals and sizes are those of the mean course
+    rough: Bool[np.ndarray, " facets"]  # then normals and sizes are those of the mean course
     polarization: Polarization
-    runs: tuple[Run, ...] = ()  # of the whole set
+    runs: tuple[Run, ...] = ()  # of the whole set of facets
 
     @property
     def count(self) -> int:
@@ -34,7 +34,7 @@ class Face:
         return len(self.sizes)
 
     def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Face":
-        """Choose some of the facets."""
+        """Select some of the facets."""
         return Face(
             **{
                 name: getattr(self, name)[chosen]

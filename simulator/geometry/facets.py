@@ -1,4 +1,4 @@
-"""Surfaces cut into facets: the scatterers of physical optics."""
+"""Surfaces divided into facets, the scatterers of physical optics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,28 +15,28 @@ from simulator.geometry.profile_lines import Edge, Run, outline
 from simulator.materials.fresnel_slab import Conductor, Material
 
 SMOOTHED = 1 / 6
-"""Standard width, over the wavelength, of the smoothing of slopes whose curvature counts. [-]"""
+"""Standard width, over the wavelength, of the slopes' smoothing in the curvature correction. [-]"""
 
 CELLS_AT_ONCE = 1_000_000
-"""Cells of a surface that are made facets in one go: some 300 MB. [-]"""
+"""Cells of a surface that are converted to facets in one batch: some 300 MB. [-]"""
 
 
 class Group(NamedTuple):
-    """Facets that reflect alike."""
+    """Facets of one material, all smooth or all rough with the same smoothing."""
 
     material: Material
-    share: float | None  # of the slopes' variance that smoothing leaves; None: smooth [-]
-    mask: Bool[np.ndarray, " facets"] | None  # which they are; None: all
+    share: float | None  # of the slopes' variance left by smoothing; None: smooth [-]
+    mask: Bool[np.ndarray, " facets"] | None  # which facets; None: all
 
 
 @dataclass(frozen=True, kw_only=True)
 class Relief:
-    """How facets lie on the mean surface of a rough body."""
+    """Position of facets relative to the mean surface of a rough body."""
 
     normals: Float32[np.ndarray, "facets 3"]  # unit vectors of the mean surface
     heights: Float32[np.ndarray, " facets"]  # of the facets' centres over it [m]
     shares: tuple[float | None, ...]
-    """Of the slopes' variance, what smoothing leaves, by material; None: it is smooth. [-]"""
+    """Share of the slopes' variance left by smoothing, by material; None: smooth. [-]"""
 
     def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Relief":
         """Choose some of the facets."""
@@ -53,16 +53,16 @@ class Facets:
     edges: Float[np.ndarray, "facets sides 3"]  # one along a line, two along a triangle [m]
     two_sided: Bool[np.ndarray, " facets"]
     materials: tuple[Material, ...] = (Conductor(),)
-    material: Int[np.ndarray, " facets"] | None = None  # index; None: all are the first
+    material: Int[np.ndarray, " facets"] | None = None  # index; None: all of the first
     mean_centres: Float[np.ndarray, "facets 3"] | None = None  # of lines; None: the centres [m]
-    runs: tuple[Run, ...] = ()  # of lines: what lies in one course
-    corners: tuple[Edge, ...] = ()  # of lines: where such courses end
+    runs: tuple[Run, ...] = ()  # of lines: the runs without corners
+    corners: tuple[Edge, ...] = ()  # of lines: ends of runs
     polarization: Polarization = "vertical"  # of lines
-    relief: "Relief | None" = None  # None: facets are where the mean surface is
+    relief: "Relief | None" = None  # None: facets are on the mean surface
 
     @property
     def places(self) -> Float[np.ndarray, "facets 3"]:
-        """Where rays start: a surface does not hide itself by its own roughness. [m]."""
+        """Starts of rays, on the mean surface: roughness does not hide its own surface. [m]."""
         if self.relief is not None:
             places: np.ndarray = self.centres - self.relief.heights[:, None] * self.relief.normals
             return places
@@ -77,14 +77,14 @@ class Facets:
 
     @cached_property
     def rough(self) -> Bool[np.ndarray, " facets"]:
-        """Which lines stand for a course with heights; their normals and sizes are its."""
+        """Which lines belong to a rough run; their normals and sizes are the mean course's."""
         rough = np.zeros(self.count, dtype=bool)
         for run in self.runs:
             rough[run.facets] = run.rough
         return rough
 
     def material_of(self, facet: int) -> Material:
-        """Return what one facet is made of."""
+        """Return the material of one facet."""
         return self.materials[0 if self.material is None else int(self.material[facet])]
 
     @property
@@ -93,7 +93,7 @@ class Facets:
         return len(self.sizes)
 
     def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Facets":
-        """Choose some of the facets; lines then stand by themselves, without edges."""
+        """Select some of the facets; lines are then returned without runs and edges."""
         return replace(
             self,
             mean_centres=None if self.mean_centres is None else self.mean_centres[chosen],
@@ -120,7 +120,7 @@ class Facets:
 
     @property
     def by_material(self) -> tuple[Group, ...]:
-        """Facets that reflect alike: of one material, and smooth or equally rough."""
+        """Groups of facets of one material, all smooth or all rough with the same smoothing."""
         shares = self._shares
         if self.material is None:
             return (Group(self.materials[0], shares[0], None),)
@@ -162,9 +162,9 @@ def surface_facets(
     Parameters
     ----------
     surface
-        The surface, as it is displaced.
+        The surface with its roughness.
     material
-        What all of it is made of; by default a conductor.
+        Of the whole surface; by default a conductor.
     polarization
         Of the antennas, where these are lines.
     wavelength
@@ -186,12 +186,12 @@ def scene_facets(
     Parameters
     ----------
     surfaces
-        At least one, all lines or all triangles, and what each is made of.
+        At least one surface, all of lines or all of triangles, and the material of each.
     polarization
         Of the antennas, where these are lines.
     wavelength
-        Of the middle of the band: slopes shorter than a sixth of it do not count as curvature;
-        0: all do. [m]
+        In the middle of the band: slopes are smoothed over a sixth of it in the curvature
+        correction; 0: not smoothed. [m]
     """
     sides = surfaces[0][0].cells.shape[1] - 1
     ends = np.cumsum([len(surface.cells) for surface, _ in surfaces])
@@ -200,7 +200,7 @@ def scene_facets(
         centres=np.empty((count, 3)),
         normals=np.empty((count, 3)),
         sizes=np.empty(count),
-        # Single precision does for triangles: a phase of 2π is off by 1e-6.
+        # Single precision suffices for triangles: a phase of 2π has an error of 1e-6.
         edges=np.empty((count, sides, 3), dtype=np.float32 if sides > 1 else np.float64),
         two_sided=np.empty(count, dtype=bool),
         materials=tuple(material for _, material in surfaces),
@@ -234,7 +234,7 @@ def scene_facets(
 
 
 def _renumbered(corners: Sequence[Edge], *, facets: int, edges: int) -> list[Edge]:
-    """Count facets and edges in a larger set, in which these begin there."""
+    """Return edges with their indices of facets and edges offset for a larger set."""
     return [
         replace(
             edge,
@@ -246,14 +246,14 @@ def _renumbered(corners: Sequence[Edge], *, facets: int, edges: int) -> list[Edg
 
 
 def is_rough(surface: Surface) -> bool:
-    """Tell whether a surface leaves its mean shape."""
+    """Return whether a surface differs from its mean shape."""
     return surface.vertices is not surface.mean_vertices and bool(
         np.any(surface.vertices != surface.mean_vertices)
     )
 
 
 def _relief(surfaces: Sequence[Surface], count: int, wavelength: float) -> Relief | None:
-    """Compare triangles with their mean surfaces; None if all are smooth."""
+    """Return triangles' normals and heights of the mean surface; None if all are smooth."""
     rough = [is_rough(surface) for surface in surfaces]
     if not any(rough):
         return None
@@ -348,7 +348,7 @@ def _joined_reliefs(parts: Sequence[Facets]) -> Relief | None:
 
 
 def profile_surface(profile: Float[np.ndarray, "vertices 3"], *, name: str = "wall") -> Surface:
-    """Make an open conducting surface of a measured or computed wall profile in 2-D. [m].
+    """Return the open conducting surface of a measured or computed 2-D wall profile. [m].
 
     Its mean course is the line between its ends.
     """

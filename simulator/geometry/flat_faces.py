@@ -1,8 +1,9 @@
-"""Flat faces of a triangle mesh: coplanar neighbours are one mirror, however finely they are cut.
+"""Flat faces of a triangle mesh: coplanar neighbouring triangles form one mirror.
 
-A mesh tells nothing of its walls: a room of 12 triangles may come as one of 3000. Triangles that
-share an edge and lie in one plane are joined to a face. A convex face is cut into quadrilaterals,
-one for every two of its corners beyond two; one with a hole or a notch keeps its triangles.
+A mesh does not mark its walls: a room of 12 triangles may be tessellated into 3000. Triangles that
+share an edge and lie in one plane are joined to a face. A convex face is divided into
+quadrilaterals, one for every two of its corners beyond two; one with a hole or a notch keeps its
+triangles.
 """
 
 import numpy as np
@@ -12,14 +13,15 @@ from scenes.meshes.triangle_mesh import TriangleMesh
 from simulator.geometry.mirrors import FLATNESS, LEAST_AREA
 
 LEAST_COSINE = 0.999
-"""Of the normals of two triangles in one face: slivers lie within the flatness of any plane. [-]"""
+"""Least cosine between the normals of two triangles of one face: slivers are within
+:data:`STRAIGHT` of planes of any direction, so that distance alone does not tell. [-]"""
 
 STRAIGHT = FLATNESS
-"""Distance from the line between its neighbours below which a corner is none. [m]"""
+"""Distance of a corner from the line between its neighbours below which it is dropped. [m]"""
 
 
 def flat_faces(mesh: TriangleMesh) -> Float[np.ndarray, "mirrors 4 3"]:
-    """Join the coplanar triangles of a mesh, and cut what results into convex quadrilaterals.
+    """Join the coplanar triangles of a mesh, and divide the faces into convex quadrilaterals.
 
     Parameters
     ----------
@@ -29,7 +31,7 @@ def flat_faces(mesh: TriangleMesh) -> Float[np.ndarray, "mirrors 4 3"]:
     Returns
     -------
     Corners in order around the edge, in the sense of the triangles; a triangle repeats its last
-    corner. What is smaller than a mirror may be is left out. [m]
+    corner. Faces below the least area of a mirror are left out. [m]
     """
     found: list[Float[np.ndarray, "some 4 3"]] = []
     for members in _coplanar(mesh):
@@ -75,7 +77,7 @@ def _coplanar(mesh: TriangleMesh) -> list[Int[np.ndarray, " members"]]:
 
 
 def _outline(faces: Int[np.ndarray, "members 3"]) -> Int[np.ndarray, " corners"] | None:
-    """Follow the edges that belong to one triangle only; None if they are no single ring."""
+    """Return the boundary, edges of one triangle only; None if it is not a single ring."""
     ends = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).tolist()
     inner = {(end, start) for start, end in ends}
     following: dict[int, int] = {}
@@ -97,7 +99,7 @@ def _outline(faces: Int[np.ndarray, "members 3"]) -> Int[np.ndarray, " corners"]
 def _convex(
     ring: Float[np.ndarray, "corners 3"], normal: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, "fewer 3"] | None:
-    """Drop what stands on a straight edge; None if a corner that is left turns the other way."""
+    """Drop corners on straight edges; None if the polygon is not convex."""
     corners = ring
     while len(corners) > 3:
         apart = _beyond_chord(corners, normal)
@@ -111,7 +113,7 @@ def _convex(
 def _beyond_chord(
     corners: Float[np.ndarray, "corners 3"], normal: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, " corners"]:
-    """How far each corner lies outside the line between its neighbours, inside negative [m]."""
+    """Distance of each corner outside the line between its neighbours, inside negative [m]."""
     before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
     chord = after - before
     length = np.linalg.norm(chord, axis=-1)
@@ -120,7 +122,7 @@ def _beyond_chord(
 
 
 def _fan(corners: Float[np.ndarray, "corners 3"]) -> Float[np.ndarray, "quads 4 3"]:
-    """Cut a convex polygon into quadrilaterals that share its first corner."""
+    """Divide a convex polygon into quadrilaterals that share its first corner."""
     last = len(corners) - 1
     picks = [(0, one, one + 1, min(one + 2, last)) for one in range(1, last, 2)]
     return np.asarray(corners[np.array(picks)])

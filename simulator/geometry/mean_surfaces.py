@@ -12,14 +12,15 @@ from simulator.geometry.mirrors import Mirrors, line_mirrors
 from simulator.materials.fresnel_slab import Absorber, Conductor, Material
 
 MOST_FACES = 64
-"""A mesh of more flat faces counts as curved, and is no mirror: chains grow as a power of them."""
+"""Most flat faces of a mesh whose faces are mirrors; beyond, it counts as curved, because the
+number of chains grows as a power of the number of mirrors. [-]"""
 
-_SAME_PLANE = 1e-9  # how far apart the two triangles of a rectangle lie at most [m]
-_SAME_NORMAL = 1e-12  # 1 - cosine of their normals at most: 1.4 µrad, and rounding is 1e-16 [-]
+_SAME_PLANE = 1e-9  # largest distance between the planes of a rectangle's two triangles [m]
+_SAME_NORMAL = 1e-12  # largest 1 - cosine between their normals: 1.4 µrad; rounding is 1e-16 [-]
 
 
 def mean_surfaces(scenario: Scenario) -> list[Surface]:
-    """Cut a scenario's objects into the fewest facets, without their roughness."""
+    """Divide a scenario's objects into the fewest facets, without their roughness."""
     smooth = scenario.model_copy(
         update={
             "objects": {
@@ -45,11 +46,11 @@ def mean_mirrors(
     Parameters
     ----------
     scenario
-        Its cylinders and curved meshes are no mirrors: a curved surface has no image.
+        Its cylinders and curved meshes are not mirrors: the image method needs planes.
     surfaces
-        Its objects, smooth and as coarse as can be.
+        Its objects' smooth surfaces, of the fewest facets.
     materials
-        What they are made of; absorbers are no mirrors either.
+        The objects' materials; absorbers are not mirrors either.
     """
     corners, made, rough, two_sided = [np.empty((0, 4, 3))], [], [], []
     for surface in surfaces:
@@ -93,7 +94,7 @@ def _flat_mirrors(surface: Surface) -> Float[np.ndarray, "mirrors 4 3"]:
 def _quadrilaterals(
     triangles: Float[np.ndarray, "triangles 4 3"],
 ) -> Float[np.ndarray, "mirrors 4 3"]:
-    """Join the two triangles of each rectangle: a path over its middle has one mirror then."""
+    """Join the two triangles of each rectangle to one mirror."""
     corners = triangles[:, :3]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     across /= np.linalg.norm(across, axis=-1, keepdims=True)
@@ -109,7 +110,7 @@ def _quadrilaterals(
         ]
         second = same[0]
         left.remove(second)
-        # The corner of the second triangle that is not on the first one.
+        # The corner of the second triangle that the first one lacks.
         apart = [
             min(float(np.linalg.norm(corner - other)) for other in corners[first])
             for corner in corners[second]

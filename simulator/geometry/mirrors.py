@@ -19,7 +19,7 @@ def dot(
 ) -> Float[np.ndarray, "..."]:
     """Scalar products of vectors, broadcast.
 
-    Written out: a matrix product's rounding depends on its size and the number of threads.
+    Not by matrix product, whose rounding depends on its size and the number of threads.
     """
     product: np.ndarray = (
         first[..., 0] * second[..., 0]
@@ -30,11 +30,11 @@ def dot(
 
 
 SEAM = 1e-8
-"""How far a point is moved before it is asked which mirror it is on: far beyond rounding, far
-below a wavelength. [m]"""
+"""Displacement of a point before the test of which mirror it is on: far above rounding, far below
+a wavelength. [m]"""
 
 ASIDE = np.array([0.8, 0.5, 0.33])
-"""Where to: a direction that no edge of a scene is likely to run along."""
+"""Direction of that displacement: along it no edge of a scene is likely to run. [-]"""
 
 LEAST_AREA = 1e-10
 """Smallest area of a mirror, that of a square of 10 µm. [m²]"""
@@ -53,7 +53,7 @@ class Mirrors:
     two_sided: Bool[np.ndarray, " mirrors"]  # else only the side of the normal reflects
 
     def __post_init__(self) -> None:
-        """Refuse what is not a flat, convex mirror."""
+        """Refuse mirrors that are not flat and convex."""
         if len(self.materials) != len(self.corners):
             raise ValueError(
                 f"{len(self.corners)} mirrors have {len(self.materials)} materials; give one each"
@@ -72,7 +72,7 @@ class Mirrors:
             )
         along = np.roll(self.corners, -1, axis=1) - self.corners
         turns = dot(np.cross(along, np.roll(along, -1, axis=1)), self.normals[:, None])
-        # Relative, as rounding is: 1e-16 for straight angles.
+        # A relative limit, like rounding: 1e-16 for straight angles.
         for index in np.flatnonzero(turns.min(axis=1) < -1e-9 * doubled):
             raise ValueError(
                 f"mirror {index} is not convex; give its corners in order around the edge, "
@@ -91,7 +91,7 @@ class Mirrors:
 
     @property
     def _across(self) -> Float[np.ndarray, "mirrors 3"]:
-        """Normals as long as twice the area."""
+        """Normals with a length of twice the area. [m²]."""
         diagonals = self.corners[:, 2:] - self.corners[:, :2]
         return np.cross(diagonals[:, 0], diagonals[:, 1])
 
@@ -131,10 +131,10 @@ class Mirrors:
         return margin
 
     def reflects_at(self, points: Float[np.ndarray, "*n 3"], mirror: int) -> Bool[np.ndarray, "*n"]:
-        """Tell which points of its plane are on a mirror.
+        """Return which points of its plane are on a mirror.
 
-        Where two mirrors of one plane share an edge, each point of it is on one of them: moved
-        by :data:`SEAM` in one and the same direction, it lies clearly on either side.
+        If two mirrors of one plane share an edge, each of its points is on exactly one of them:
+        it is displaced by :data:`SEAM` in the same direction for both.
         """
         normal = self.normals[mirror]
         step = SEAM * (ASIDE - float(ASIDE @ normal) * normal)
@@ -150,7 +150,7 @@ def line_mirrors(
     two_sided: Bool[np.ndarray, " mirrors"],
     half_height: float = 1.0,
 ) -> Mirrors:
-    """Make the mirrors of a 2-D scene: strips that stand on line segments in the plane z = 0.
+    """Return the mirrors of a 2-D scene: upright strips on line segments in the plane z = 0.
 
     The normal of a segment along +x points to -y. The height does not matter as long as all
     sources and receivers lie in the plane.

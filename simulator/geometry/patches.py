@@ -1,8 +1,8 @@
-"""Triangles in small patches: what a patch echoes varies slowly over the band and the array.
+"""Triangles in small patches, whose sums vary slowly over the band and the array.
 
 Relative to the delay of its centre, the sum over a patch's triangles is a smooth function of
-frequency and of the antennas' places: a few of each carry it. Within a patch, single precision
-does: phases are those of differences of length.
+frequency and of the antennas' positions, and is interpolated from a few of each. Within a patch,
+single precision suffices: phases are those of differences of length.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from scipy.constants import speed_of_light
 from simulator.geometry.facets import Facets
 
 MOST_CELLS = 0.25
-"""Side of a patch over c/B: the sum over it turns by less than π over the band. [-]"""
+"""Side of a patch over c/B: the phase of its sum changes by less than π over the band. [-]"""
 
 FEWEST_FACETS = 8
-"""Largest facets that fit side by side into a patch, at least: fewer would make a sum of each
-patch cost more than its facets. [-]"""
+"""Least side of a patch, in sides of the largest facet: with smaller patches the cost of each patch
+exceeds that of its facets. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Patches:
 
     centres: Float[np.ndarray, "patches 3"]  # [m]
     radii: Float[np.ndarray, " patches"]  # of a sphere around the corners of all triangles [m]
-    first: Int[np.ndarray, " patches_and_one"]  # where each patch's triangles begin
+    first: Int[np.ndarray, " patches_and_one"]  # index of each patch's first triangle
     order: Int[np.ndarray, " facets"]  # index of each triangle in the whole set
     offsets: Float32[np.ndarray, "facets 3"]  # centroids [m]
     edges: Float32[np.ndarray, "facets 2 3"]  # [m]
@@ -35,7 +35,7 @@ class Patches:
     mean: Float32[np.ndarray, "facets 3"] | None = None  # normals of the mean surface, if rough
 
     def part(self, chosen: Int[np.ndarray, " chosen"]) -> "Patches":
-        """Choose some of the triangles, by their place in the order; empty patches go."""
+        """Select triangles by their index in the order; empty patches are dropped."""
         owner = np.searchsorted(self.first, chosen, side="right") - 1
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
         kept = owner[starts]
@@ -51,7 +51,7 @@ class Patches:
         )
 
     def patch_range(self, start: int, stop: int) -> "Patches":
-        """Choose consecutive patches."""
+        """Select consecutive patches."""
         return self.part(np.arange(self.first[start], self.first[stop]))
 
     @property
@@ -61,7 +61,7 @@ class Patches:
 
 
 def patch_side(facets: Facets, bandwidth: float) -> float:
-    """Choose how large patches are. [m]."""
+    """Return the side of the patches. [m]."""
     return max(MOST_CELLS * speed_of_light / bandwidth, FEWEST_FACETS * facets.extent / 2)
 
 

@@ -1,13 +1,13 @@
-r"""Straight or gently bent runs of line facets: their mean course, their heights, and their ends.
+r"""Straight or slightly curved runs of line facets: their mean course, heights and ends.
 
-A plate is one run, a box has four, a cylinder is one that closes on itself. Heights are taken from
-the mean course. A facet stands for a cubic through its own and the neighbouring vertices: its
-centre lies at the mean of that, :math:`(-h_{-1} + 13 h_0 + 13 h_1 - h_2)/24`, and its slope is that
-of the line which fits best, the chord's less a sixtieth of the chords' second difference. Facets
-of a quarter of a wavelength would otherwise lose a third of the Bragg wave at 45°.
+A plate is one run, a box has four, a cylinder is one closed run. Heights are measured from the mean
+course. A facet represents a cubic through its own and the neighbouring vertices: its centre is at
+the cubic's mean, :math:`(-h_{-1} + 13 h_0 + 13 h_1 - h_2)/24`, and its slope is that of the best
+fitting line, the chord's less a sixtieth of the chords' second difference. Chords alone would, for
+facets of a quarter of a wavelength, lose a third of the Bragg wave at 45°.
 
-Where a run ends there is an edge: of a plate, a half plane; where two runs of a closed body meet
-at a convex angle, a wedge.
+The ends of runs are edges: of a plate, a half plane; where two runs of a closed body meet at a
+convex angle, a wedge.
 """
 
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from jaxtyping import Float, Int
 from scenes.realisations.object_surface import Surface
 
 CORNER = np.radians(20.0)
-"""Turn of the mean course from one facet to the next from which on it is an edge: a cylinder's
-coarsest facets turn by 6°. [rad]"""
+"""Least angle between neighbouring facets of the mean course that is an edge: between the coarsest
+facets of a cylinder it is 6°. [rad]"""
 
 LEAST_HEIGHT = 1e-12
-"""Height that rounding leaves on a smooth surface some metres away. [m]"""
+"""Bound of the rounding error in the heights of a smooth surface some metres away. [m]"""
 
 EVEN = 0.01
-"""Relative spread of the steps along a run up to which it counts as evenly sampled. [-]"""
+"""Largest relative variation of the steps along a run that counts as evenly sampled. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,32 +41,32 @@ class Run:
 
     @cached_property
     def places(self) -> Int[np.ndarray, " facets"]:
-        """Where each facet of the whole set lies on this run; -1: elsewhere."""
+        """Index on this run of each facet of the whole set; -1: not on it."""
         places = np.full(self.count, -1, dtype=np.int64)
         places[self.facets] = np.arange(self.facets.size)
         return places
 
     @property
     def rough(self) -> bool:
-        """Whether the surface leaves its mean course at all."""
+        """Whether any height differs from the mean course."""
         return bool(np.any(np.abs(self.heights) > LEAST_HEIGHT))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Edge:
-    """Where runs end: the exterior angle, and what meets there."""
+    """The end of one run, or the corner of two: exterior angle and facets that meet there."""
 
     place: Float[np.ndarray, " 2"]  # [m]
-    exterior: float  # angle that is filled with air, over π: 2 for a plate's end [-]
+    exterior: float  # exterior angle (in air) over π: 2 for a plate's end [-]
     facets: tuple[int, ...]  # the last facet of each run that meets here
     inward: Float[np.ndarray, "runs 2"]  # unit vectors from the edge along each run
-    length: float = 0.0  # of a plate, whose ends see each other along it [m]
+    length: float = 0.0  # of the plate between two such edges [m]
     partner: int = -1  # index of the edge at the plate's other end; -1: none
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outline:
-    """What :func:`outline` makes of a surface of lines."""
+    """Result of :func:`outline`: facets, runs and edges of a surface of lines."""
 
     centres: Float[np.ndarray, "facets 3"]  # [m]
     mean_centres: Float[np.ndarray, "facets 3"]  # [m]
@@ -78,7 +78,7 @@ class Outline:
 
 
 def outline(surface: Surface, first: int = 0) -> Outline:
-    """Find the runs and edges of a surface of lines.
+    """Return the facets, runs and edges of a surface of lines.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _to_the_right(ways: Float[np.ndarray, "facets 3"]) -> Float[np.ndarray, "fac
 def _split(
     cells: Int[np.ndarray, "cells 2"], tangents: Float[np.ndarray, "cells 3"]
 ) -> tuple[list[tuple[np.ndarray, bool]], list[tuple[int, int]]]:
-    """Split cells into runs; pairs of cells that share a vertex at a corner."""
+    """Split cells into runs; return these, and the pairs of cells that meet at a corner."""
     count = len(cells)
     following = np.roll(np.arange(count), -1)
     joined = cells[:, 1] == cells[following, 0]
@@ -148,7 +148,7 @@ def _split(
     lasts = np.flatnonzero(~smooth[order])
     parts = [(part, False) for part in np.split(order, lasts[:-1] + 1)]
     corners = [(int(one), int(following[one])) for one in breaks if joined[one]]
-    # A chain of cells that does not begin with its first meets itself elsewhere.
+    # A closed chain may begin in the middle of a run: join its last part to the first.
     for one in breaks[~joined[breaks]].tolist():
         meets = np.flatnonzero(cells[:, 0] == cells[one, 1])
         corners += [(one, int(other)) for other in meets if other != one]
@@ -158,12 +158,12 @@ def _split(
 def _fitted(
     ends: Float[np.ndarray, "run 2"], closed: bool
 ) -> tuple[Float[np.ndarray, " run"], Float[np.ndarray, " run"]]:
-    """Mean heights of the cubics, and rises of the lines that fit them best. [m]."""
+    """Return mean heights of the cubics, and rises of their best fitting lines. [m]."""
     rise = ends[:, 1] - ends[:, 0]
     if closed:
         before, after = np.roll(ends[:, 0], 1), np.roll(ends[:, 1], -1)
         bend = np.roll(rise, 1) - 2 * rise + np.roll(rise, -1)
-    else:  # beyond its ends the profile goes on as it came, turned about them
+    else:  # beyond its ends the profile continues point-symmetrically about them
         before = np.concatenate([[2 * ends[0, 0] - ends[0, 1]], ends[:-1, 0]])
         after = np.concatenate([ends[1:, 1], [2 * ends[-1, 1] - ends[-1, 0]]])
         padded = np.concatenate([rise[:1], rise, rise[-1:]])

@@ -1,4 +1,4 @@
-"""The scene that rays are traced in: a Sionna RT scene of the scenario's surfaces."""
+"""The scene for ray tests: a Sionna RT scene of the scenario's surfaces."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,33 +18,33 @@ mi.set_variant(engine.mitsuba_variant())
 import sionna.rt as rt  # noqa: E402  the variant has to be chosen first
 
 CLEARANCE = 2e-6
-"""How far from its facet a ray starts at least: 2 µm hide nothing that scatters at a millimetre's
-wavelength. [m]"""
+"""Least distance of a ray's start from its facet: 2 µm are negligible at wavelengths of a
+millimetre. [m]"""
 
 CLEARANCE_OF_EXTENT = 2e-6
-"""The same over the farthest coordinate from the scene's centre: 17 roundings of single precision,
-of which vertices, the ray's start and its direction cost about one each, and the intersection some
+"""The same relative to the farthest coordinate from the scene's centre: 17 roundings of single
+precision; vertices, the ray's start and its direction cost about one each, the intersection some
 more (C. Wächter and N. Binder, "A fast and robust method for avoiding self-intersection", 2019,
-doi:10.1007/978-1-4842-4427-2_6, take offsets in proportion to coordinates, too). [-]"""
+doi:10.1007/978-1-4842-4427-2_6, use offsets in proportion to coordinates, too). [-]"""
 
 HALF_HEIGHT = 0.05
-"""Half the height of the strips that stand for line facets; rays run at z = 0. [m]."""
+"""Half the height of the strips that represent line facets; rays run at z = 0. [m]"""
 
 RAYS_AT_ONCE = 4_000_000
-"""Rays traced in one go: about 300 MB of single-precision rays."""
+"""Rays traced in one batch: about 300 MB of single-precision rays. [-]"""
 
 
 @dataclass(frozen=True)
 class RayScene:
     """Surfaces that rays are tested against, in coordinates about their own centre.
 
-    Rays are traced in single precision, which resolves so many parts of a coordinate: about the
-    centre it resolves the scene's extent alike wherever the scene stands.
+    Rays are traced in single precision, whose resolution is relative to a coordinate: in
+    coordinates about the centre it does not depend on where the scene is in the world.
     """
 
     scene: rt.Scene
     centre: Float[np.ndarray, " 3"]  # of the box around all surfaces [m]
-    clearance: float  # how far off a surface a ray has to start and to end [m]
+    clearance: float  # least distance of a ray's ends from a surface [m]
 
     @property
     def objects(self) -> Mapping[str, rt.SceneObject]:
@@ -58,14 +58,14 @@ class RayScene:
 
 
 def build_scene(surfaces: Sequence[Surface], *, mean: bool = False) -> RayScene:
-    """Build the scene that rays are tested in; each surface becomes an object of its name.
+    """Build the scene for ray tests; each surface becomes an object of its name.
 
     Parameters
     ----------
     surfaces
         Lines become upright strips.
     mean
-        Leave the roughness out.
+        Whether surfaces are built without roughness.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def sionna_rt_scene(
     materials
         Radio material of each surface, by the surface's name.
     frequency
-        Of the scene, to which materials adapt. [Hz]
+        Of the scene; sets the materials' parameters. [Hz]
     half_height
         Half the height of the strips. [m]
 
@@ -114,7 +114,7 @@ def sionna_rt_scene(
     scene = _scene(surfaces, np.zeros(3), half_height)
     scene.frequency = frequency
     if surfaces:
-        # Only now, since a material may be unknown at the frequency that Sionna begins with.
+        # Materials come after the frequency: they may be unknown at Sionna's default one.
         for one in scene.objects.values():
             one.radio_material = materials[one.mi_mesh.id()]
         scene.remove("/conductor")
@@ -124,12 +124,12 @@ def sionna_rt_scene(
 def _scene(
     surfaces: Sequence[Surface], centre: Float[np.ndarray, " 3"], half_height: float
 ) -> rt.Scene:
-    """Make all surfaces conductors: it does for rays that only ask what they meet."""
+    """Build a scene with all surfaces conducting: ray tests need no materials."""
     names = [surface.name for surface in surfaces]
     if len(set(names)) < len(names):
         raise ValueError(f"surfaces {names}: each needs a name of its own; rename some")
-    # Sionna's own 'metal' ends at 100 GHz; its constants do for a conductor at any frequency.
-    # Its name is in the objects' name space, and none of theirs holds a slash.
+    # Sionna's own 'metal' ends at 100 GHz; its constants serve for a conductor at any frequency.
+    # Its name shares the objects' name space; no object's name holds a slash.
     metal = rt.RadioMaterial("/conductor", relative_permittivity=1.0, conductivity=1e7)
     meshes = {surface.name: _mesh(surface, centre, half_height) for surface in surfaces}
     for mesh in meshes.values():
@@ -138,15 +138,15 @@ def _scene(
 
 
 def _traced(meshes: Mapping[str, mi.Mesh]) -> Any:
-    """Make a Mitsuba scene in which no ray slips through between two triangles.
+    """Build a Mitsuba scene with watertight intersection tests.
 
-    Of rays that pass exactly through an edge, Embree's quick test misses one in nine; its robust
-    one misses none and takes as long. OptiX (the CUDA backend) has no such choice.
+    For rays exactly through an edge, Embree's fast test misses one in nine; its robust one misses
+    none and takes as long. OptiX (the CUDA backend) has no such option.
     """
     options: dict[str, Any] = {"type": "scene"}
     if not str(mi.variant()).startswith("cuda"):
         options["embree_use_robust_intersections"] = True
-    # Names of ours may be keys of Mitsuba's, so they are given afterwards.
+    # Our names might equal keys of Mitsuba's dictionary, so they are set afterwards.
     scene = mi.load_dict(options | {f"mesh{n}": mesh for n, mesh in enumerate(meshes.values())})
     for name, mesh in meshes.items():
         mesh.set_id(name)
@@ -181,7 +181,7 @@ def _extruded(
 def facets_visible(
     rays: RayScene, facets: Facets, points: Float[np.ndarray, "points 3"]
 ) -> Bool[np.ndarray, "points facets"]:
-    """Tell which facets each point sees, by a ray from just off the facet to the point."""
+    """Return which facets each point sees, by a ray from just off the facet to the point."""
     visible = np.empty((len(points), facets.count), dtype=bool)
     if not rays.objects or facets.count == 0:
         visible[:] = True
@@ -191,7 +191,7 @@ def facets_visible(
     chunk = max(1, RAYS_AT_ONCE // facets.count)
     for first in range(0, len(points), chunk):
         some = points[first : first + chunk]
-        if len(some) == 1:  # no need to look anything up
+        if len(some) == 1:  # no lookup needed
             centre, normal, end = centres, normals, _place(some[0])
         else:
             ray = dr.arange(mi.UInt32, len(some) * facets.count)
@@ -224,7 +224,7 @@ def _double(values: Float[np.ndarray, "*n 3"]) -> Any:
 
 
 def _place(point: Float[np.ndarray, " 3"]) -> Any:
-    # Opaque: the same kernel serves all points.
+    # An opaque value, not a literal: one compiled kernel serves all points.
     return mi.Vector3d(*(dr.opaque(mi.Float64, float(value)) for value in point))
 
 
@@ -233,7 +233,7 @@ def blocked(
     starts: Float[np.ndarray, "*rays 3"],
     ends: Float[np.ndarray, "*rays 3"],
 ) -> Bool[np.ndarray, "*rays"]:
-    """Tell which straight segments meet a surface, by Mitsuba's ``ray_test``."""
+    """Return which straight segments meet a surface, by Mitsuba's ``ray_test``."""
     shape = starts.shape[:-1]
     if not rays.objects or 0 in shape:
         return np.zeros(shape, dtype=bool)

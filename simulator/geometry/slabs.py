@@ -1,6 +1,6 @@
-"""Flat faces of bodies that let waves through, and which of them straight lines cross.
+"""Flat faces of bodies that transmit waves, and the test of which of them straight lines cross.
 
-A set of faces is a number whose bits are the faces: 0 is free space.
+A set of faces is an integer with one bit for each face; 0 is free space.
 """
 
 from collections.abc import Iterable
@@ -14,10 +14,10 @@ from simulator.materials.fresnel_slab import Dielectric
 from simulator.materials.slab_insertion import Crossing
 
 MOST_SLABS = 62
-"""Most faces that let waves through: the bits of a signed whole number. [-]"""
+"""Most faces that transmit waves: the bits of a signed 64-bit integer. [-]"""
 
 LINES_AT_ONCE = 4_000_000
-"""Lines whose crossings are looked for in one go: some 500 MB. [-]"""
+"""Lines tested for crossings in one batch: some 500 MB. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,10 +25,10 @@ class Slabs:
     """Faces of bodies of a dielectric, each a slab with air on both sides."""
 
     faces: Mirrors
-    owners: tuple[str, ...]  # the object that each is a face of
+    owners: tuple[str, ...]  # name of the object that each face belongs to
 
     def __post_init__(self) -> None:
-        """Refuse more than there are bits, and what is no slab."""
+        """Refuse more faces than there are bits, and materials that are not slabs."""
         if len(self.faces) > MOST_SLABS:
             raise ValueError(
                 f"{len(self.faces)} faces let waves through, more than {MOST_SLABS}; let some block"
@@ -51,7 +51,7 @@ class Slabs:
     def crossed(
         self, starts: Float[np.ndarray, "*n 3"], ends: Float[np.ndarray, "*n 3"]
     ) -> Int[np.ndarray, "*n"]:
-        """Tell which faces straight lines cross, ends on a face left out.
+        """Return the sets of faces that straight lines cross, without faces at a line's ends.
 
         Parameters
         ----------
@@ -75,14 +75,14 @@ class Slabs:
         *,
         off: float,
     ) -> Int[np.ndarray, "points places"]:
-        """Tell which faces lie between each point and each place.
+        """Return the sets of faces between each point and each place.
 
         Parameters
         ----------
         points, places
             [m]
         off
-            What lies within this distance of a face is on it, and does not see through it. [m]
+            Points within this distance of a face are on it: it is not in their way. [m]
         """
         found = np.zeros((len(points), len(places)), dtype=np.int64)
         rows = max(1, LINES_AT_ONCE // max(1, len(places)))
@@ -100,7 +100,7 @@ class Slabs:
 
 
 def sets_among(crossed: Int[np.ndarray, "*n"], seen: Bool[np.ndarray, "*n"]) -> Iterable[int]:
-    """Return the different sets of faces that something is seen through, free space left out."""
+    """Return the distinct sets of faces between points that see each other, without free space."""
     return [one for one in np.unique(crossed[seen]).tolist() if one]
 
 

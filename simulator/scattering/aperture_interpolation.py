@@ -1,10 +1,10 @@
-r"""Interpolation over the aperture: what a small patch scatters, from a few positions of it.
+r"""Interpolation over the aperture of a small patch's scattering, from a few positions.
 
-Once the delay of a patch's centre is taken out, its triangles' sum turns, over a half aperture
-:math:`h` along an axis, by at most :math:`\delta = k \rho h / R` for each end that moves, with
-the patch's radius :math:`\rho` and its distance :math:`R`. Interpolated from M Chebyshev nodes
-along that axis, the error is at most :math:`2 (\delta/2)^M / M!`. The fall of the antennas'
-patterns over the array adds to the argument.
+Without the delay of the patch's centre, the phase of its triangles' sum changes, over a half
+aperture :math:`h` along an axis, by at most :math:`\delta = k \rho h / R` for each end that moves,
+with the patch's radius :math:`\rho` and its distance :math:`R`. The error of interpolation from M
+Chebyshev nodes along that axis is at most :math:`2 (\delta/2)^M / M!`. The logarithmic decrease of
+the antennas' patterns over the array adds to :math:`\delta`.
 """
 
 import math
@@ -24,18 +24,18 @@ ACCURACY = 3e-5
 """Largest error of the interpolation along one axis, relative to the patch's sum. [-]"""
 
 COUNTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
-"""Nodes along an axis that are tried: few choices, so that many patches share one. [-]"""
+"""Allowed numbers of nodes along an axis: few, so that many patches share one. [-]"""
 
 GAIN = 0.75
-"""Share of the array's places above which nodes do not save anything. [-]"""
+"""Ratio of nodes to the array's positions above which interpolation saves no time. [-]"""
 
 SAME_PLACE = 1e-9
-"""How far senders may be off an affine image of the receivers. [m]"""
+"""Largest deviation of senders from an affine map of the receivers. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Aperture:
-    """Where links begin and end, as functions of up to three coordinates."""
+    """Positions of links' ends, as affine functions of up to three coordinates."""
 
     coordinates: Float[np.ndarray, "links axes"]  # of each link, within ±extents [m]
     extents: Float[np.ndarray, " axes"]  # [m]
@@ -47,7 +47,7 @@ class Aperture:
     def nodes(
         self, counts: tuple[int, ...], links: Links
     ) -> tuple[Links, Float[np.ndarray, "links nodes"]]:
-        """Place the links that stand for all; and what interpolates from them."""
+        """Return links at the nodes, and the interpolation matrix from these to all links."""
         along = [
             chebyshev_nodes(-extent, extent, count)
             for extent, count in zip(self.extents, counts, strict=True)
@@ -65,7 +65,7 @@ class Aperture:
 
 
 def find_aperture(links: Links) -> Aperture | None:
-    """Describe the links' places by few coordinates; None if senders do not follow receivers."""
+    """Return the links' positions by few coordinates; None if senders have no affine map."""
     middle = (links.receivers.min(axis=0) + links.receivers.max(axis=0)) / 2
     apart = links.receivers - middle
     axes = np.linalg.svd(np.einsum("lx,ly->xy", apart, apart))[2]
@@ -95,12 +95,12 @@ def find_aperture(links: Links) -> Aperture | None:
 def node_counts(
     aperture: Aperture, links: Links, patches: Patches, highest: float
 ) -> Int[np.ndarray, "patches axes"]:
-    """Count the nodes along each axis that each patch needs; 0 where none would do.
+    """Count the nodes along each axis that each patch needs; 0 if no allowed number suffices.
 
     Parameters
     ----------
     aperture, links, patches
-        Where they are.
+        Of the sum.
     highest
         The highest frequency. [Hz]
     """
@@ -124,7 +124,7 @@ def _turn(
     patches: Patches,
     highest: float,
 ) -> Float[np.ndarray, "patches axes"]:
-    """By how much a patch's sum turns or falls over half the aperture, for one of its ends."""
+    """Change of a patch's sum in phase or logarithm over half the aperture, for one end. [-]."""
     towards = patches.centres - middle
     distance = np.sqrt(np.einsum("px,px->p", towards, towards))
     spread = float(np.sqrt((steps**2).sum())) + patches.radii
@@ -135,7 +135,7 @@ def _turn(
     farthest_off = pattern.off_axis(towards / distance[:, None]) + spread / nearest
     argument = wavenumber * patches.radii + pattern.slope_off_axis(farthest_off) + 1.0
     turn: np.ndarray = np.where(near, np.inf, argument / nearest)[:, None] * np.maximum(steps, 0.0)
-    return np.where(np.isnan(turn), 0.0, turn)  # what does not move does not turn
+    return np.where(np.isnan(turn), 0.0, turn)  # no movement, no change
 
 
 def _combined(

@@ -1,10 +1,10 @@
-"""Links from transmitters to receivers apart over millions of triangles, at few frequencies.
+"""Bistatic links over millions of triangles, at few frequencies.
 
 The same physical optics as :mod:`simulator.scattering.physical_optics`, of conductors and
-dielectrics: everything of a facet is worked out in one kernel, at each frequency by itself, and
-summed in blocks of a fixed size, so that the result does not depend on the number of threads.
-Antenna patterns and reflection coefficients are looked up in tables. Lengths and phases are in
-double precision, amplitudes in single.
+dielectrics: one kernel computes facets' contributions, at each frequency separately, and sums them
+in blocks of a fixed size, so that the result does not depend on the number of threads. Antenna
+patterns and reflection coefficients are read from tables. Lengths and phases are in double
+precision, amplitudes in single.
 """
 
 import math
@@ -40,20 +40,20 @@ Complex2f: Any = mi.Complex2f
 Complex2d: Any = mi.Complex2d
 
 FREQUENCIES_AT_ONCE = 8
-"""Frequencies in one kernel: it compiles in a second, and reads the facets once for all."""
+"""Frequencies in one kernel: it compiles in a second, and reads the facets once for all. [-]"""
 
 BLOCK = 1024
-"""Facets that are summed in single precision; their sums are added in double. [-]"""
+"""Facets summed in single precision; the sums of such blocks are added in double. [-]"""
 
 PATTERN_STEPS = 2**16
-"""Steps of a pattern's table: a beam of a degree is followed to 1e-5 of its peak. [-]"""
+"""Steps of a pattern's table: the error for a beam of a degree is 1e-5 of its peak. [-]"""
 
 TABLE_ACCURACY = 1e-5
 """Largest error of a coefficient half way between two angles of its table. [-]"""
 
 MOST_ANGLES = 2**15
-"""Most angles of a table: within a degree of grazing, the last waves of a slab that hardly
-absorbs are smoothed. [-]"""
+"""Most angles of a table. Within a degree of grazing, the fastest ripples of a slab of low loss
+are then not resolved. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class Port:
         return np.asarray(falling / falling[0], dtype=np.float32)
 
     def bound(self, centre: Float[np.ndarray, " 3"], radius: float) -> float:
-        """Largest field gain into a ball, over the peak. [-]."""
+        """Upper bound of the field gain over a sphere, relative to the peak. [-]."""
         towards = centre - self.position
         distance = float(np.linalg.norm(towards))
         if radius >= distance:
@@ -96,7 +96,7 @@ def pattern_table(antenna: Antenna) -> Float32[np.ndarray, " steps"] | None:
 
 
 class BistaticKernel:
-    """Triangles of one surface as the kernel reads them."""
+    """Triangles of one surface in the kernel's arrays, and the sum over them."""
 
     def __init__(
         self, surface: Surface, material: Material, frequencies: Float[np.ndarray, " freqs"]
@@ -106,7 +106,7 @@ class BistaticKernel:
                 f"surface {surface.name!r} is made of lines; the kernel sums triangles"
             )
         self.count = len(surface.cells)
-        self._short = -self.count % BLOCK  # the last block is filled up with facets of no size
+        self._short = -self.count % BLOCK  # the last block is padded with facets of size 0
         corners = [
             mi.Vector3d(*(dr.gather(mi.Float64, axis, index) for axis in _axes(surface.vertices)))
             for index in (mi.UInt32(_padded(c, self._short)) for c in surface.cells.T)
@@ -216,7 +216,7 @@ class BistaticKernel:
         return np.array(parts[::2]) + 1j * np.array(parts[1::2])
 
     def _leg(self, port: Port) -> "_Leg":
-        # Opaque: the same kernel serves all links.
+        # An opaque value, not a literal: one compiled kernel serves all links.
         towards = [
             dr.opaque(mi.Float64, float(place)) - axis
             for place, axis in zip(port.position, self._centres, strict=True)
@@ -246,7 +246,7 @@ class BistaticKernel:
         return normals
 
     def _curvature(self, legs: Legs, side: Any) -> Any:
-        """Work out what roughness adds to the facets' weights; complex for a dielectric. [-]."""
+        """Return the curvature term of the facets' weights; complex for a dielectric. [-]."""
         mean, normals = side * mi.Vector3d(self._mean), side * mi.Vector3d(self._normals)
         upright = dr.dot(mean, normals)
         slope = mean - normals / dr.maximum(upright, 1e-6)
@@ -277,14 +277,14 @@ def reflection_rows(
     Parameters
     ----------
     material
-        What reflects.
+        Of the surface.
     frequencies
         Any grid. [Hz]
 
     Returns
     -------
-    Real and imaginary part of TE, then of TM, at as few angles as :data:`TABLE_ACCURACY` asks
-    for. [-]
+    Real and imaginary part of TE, then of TM, at the fewest angles for which the error is below
+    :data:`TABLE_ACCURACY`. [-]
     """
     angles = 64
     while angles < MOST_ANGLES:

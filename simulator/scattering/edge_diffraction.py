@@ -1,4 +1,4 @@
-r"""What edges add to physical optics: the field of the fringe currents (Ufimtsev).
+r"""Edge diffraction beyond physical optics: the field of the fringe currents (Ufimtsev).
 
 Diffraction at a perfectly conducting wedge with the exterior angle :math:`n\pi` gives, by [1]_,
 
@@ -8,15 +8,15 @@ Diffraction at a perfectly conducting wedge with the exterior angle :math:`n\pi`
 f for the electric field along the edge (TM), g for the magnetic one (TE), with angles from one of
 its faces through the air. An end of the facets of physical optics, in the reciprocal form
 :math:`\cos\theta_t + \cos\theta_r`, already gives :math:`f_0 = -g_0 = \tfrac12 \tan\tfrac12(\varphi
-+ \varphi_0)` for each face that both antennas see. The difference is what the fringe currents
-radiate; it is finite also in the direction of the mirror, where both grow without bounds. A unit
-line source at distance r gives :math:`2 (f - f_0)\, G(r)\, G(r')` at :math:`r'`.
++ \varphi_0)` for each face that both antennas see. The difference is the field of the fringe
+currents; it is finite also in the specular direction, where both terms have a pole. A unit line
+source at distance r gives :math:`2 (f - f_0)\, G(r)\, G(r')` at :math:`r'`.
 
-In TE the field along a plate does not vanish, and its two ends see each other: waves over both,
-:math:`4\, G(L) / (\cos\tfrac12\varphi_0 \cos\tfrac12\varphi)` for each order, are added. In TM they
-are weaker by :math:`1/kL` and left out, as are waves between the corners of a closed body, and
-edges of dielectrics, where facets end as by physical optics. Diffraction to where one antenna does
-not see a face that the other sees (around a corner) is left out as well.
+In TE the field along a plate does not vanish, and double diffraction between its two ends,
+:math:`4\, G(L) / (\cos\tfrac12\varphi_0 \cos\tfrac12\varphi)` for each order, is added. In TM it
+is weaker by :math:`1/kL` and left out, as are waves between the corners of a closed body, and
+edges of dielectrics, where only physical optics is used. Diffraction around a corner, where only
+one antenna sees a face, is left out as well.
 
 References
 ----------
@@ -40,8 +40,8 @@ from simulator.materials.fresnel_slab import Conductor, Material
 from simulator.scattering.small_slope import kernels
 
 NUDGE = 1e-6
-"""Distance from a pole at which both terms are evaluated instead of on it; the difference of the
-two terms varies by as much. [rad]"""
+"""Distance from a pole at which both terms are evaluated instead of at the pole; their difference
+changes by a relative amount of this order. [rad]"""
 
 
 def fringe(
@@ -52,14 +52,14 @@ def fringe(
     faces: Sequence[bool],
     polarization: Polarization,
 ) -> Float[np.ndarray, "*n"]:
-    """Diffraction coefficient of a wedge, less what the ends of its facets give. [-].
+    """Diffraction coefficient of a wedge minus that of the ends of its facets. [-].
 
     Parameters
     ----------
     transmit, receive
         Angles to both antennas from the first face, through the air. [rad]
     exterior
-        Angle that is filled with air, over π. [-]
+        Exterior angle (in air) over π. [-]
     faces
         Whether both antennas see the first face, and the second.
     polarization
@@ -94,7 +94,7 @@ class EdgeView:
 def edge_view(
     edges: Sequence[Edge], ports: Ports, port: int, frequencies: Float[np.ndarray, " freqs"]
 ) -> EdgeView:
-    """Look from one port at all edges."""
+    """Return directions and distances of all edges from one port."""
     places = np.array([edge.place for edge in edges])
     towards = ports.positions[port, :2] - places
     lengths = np.hypot(towards[:, 0], towards[:, 1])
@@ -113,7 +113,7 @@ def edge_echo(
     *,
     waves: Waves,
 ) -> Complex[np.ndarray, " freqs"]:
-    """Sum what the edges of a scene add to the facets of one link.
+    """Sum the edges' contribution to one link, beyond that of the facets.
 
     Parameters
     ----------
@@ -195,12 +195,12 @@ def rough_end(
     *,
     polarization: Polarization,
 ) -> complex:
-    r"""Return what a flat end gives beyond that of a rough line's weights, as a coefficient.
+    r"""Return the end term of a flat line minus that of a rough line's weights, as a coefficient.
 
     The weight is :math:`2B/Q` in place of :math:`R\,Q`. A constant weight N that ends at an edge
     radiates like a coefficient :math:`-N / 2 (\hat s_i + \hat s_s)\cdot\hat e`, with
-    :math:`\hat e` inward; the difference is finite towards the mirror, where
-    :math:`B - KR` falls with the square.
+    :math:`\hat e` inward; the difference is finite in the specular direction, where
+    :math:`B - KR` vanishes to second order.
     """
     (t_i, q_i), (t_s, q_s) = ((way @ inward, way @ normal) for way in ways)
     centre = np.array([frequencies[frequencies.size // 2]])

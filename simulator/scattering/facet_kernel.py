@@ -1,8 +1,8 @@
-"""Links over millions of triangles: their geometry in one kernel, their sum on the CPU's cores.
+"""Links over millions of triangles: geometry in a Dr.Jit kernel, sums over the band on CPU cores.
 
-The same physical optics as :mod:`simulator.scattering.physical_optics` does in NumPy, in the same
-order: distances and phases in double precision, amplitudes in single. What a facet reflects must
-not vary over the band (conductors; echoes, which share one coefficient).
+The same physical optics as in NumPy in :mod:`simulator.scattering.physical_optics`, in the same
+order: distances and phases in double precision, amplitudes in single. Facets' reflection must not
+vary over the band (conductors; monostatic echoes, which share one coefficient).
 """
 
 import math
@@ -38,17 +38,17 @@ Complex2d: Any = mi.Complex2d
 
 
 WAITING = 2
-"""Links whose facets are ready before a core is free to sum them: each takes 40 byte a facet."""
+"""Links whose evaluated facets may wait for a free core: each takes 40 byte a facet. [-]"""
 
 CONDUCTOR = Conductor()
 
 Pair = tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]
-"""Where a link's transmitter and receiver stand. [m]"""
+"""Positions of a link's transmitter and receiver. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Weights:
-    """What is multiplied to the facets' scattering in one link."""
+    """Factors of the facets' scattering in one link."""
 
     lit: Bool[np.ndarray, " facets"]  # seen from both ends
     gain: Float[np.ndarray, " facets"] | None = None  # product of both patterns; None: 1
@@ -58,7 +58,7 @@ class Weights:
 
 
 class FacetKernel:
-    """Facets as the kernel reads them, between antennas of two polarizations."""
+    """Facets in the kernel's arrays, for antennas of two polarizations."""
 
     def __init__(
         self, facets: Facets, sent: Polarization = VERTICAL, received: Polarization = VERTICAL
@@ -73,10 +73,10 @@ class FacetKernel:
         self.two_sided = mi.Bool(facets.two_sided)
 
     def typical_advance(self, pairs: list[Pair]) -> float:
-        """Difference of delay over one facet, the largest of these links. [s].
+        """Typical difference of delay over one facet, the largest of these links. [s].
 
-        Over a link's facets it is the root of the mean sixth power: what three nodes leave of
-        a facet goes with the third power, and adds up in power.
+        Over a link's facets it is the sixth root of the mean sixth power: the error of three
+        nodes grows with the third power, and errors of facets add in power.
         """
         largest = 0.0
         for transmit, receive in pairs:
@@ -86,7 +86,7 @@ class FacetKernel:
             slope = dr.maximum(dr.maximum(abs(first), abs(second)), abs(first - second))
             slope *= 1.0 / speed_of_light
             scale = float(dr.max(slope)[0])
-            if scale > 0.0:  # in single precision the sixth power would vanish
+            if scale > 0.0:  # in single precision the sixth power would underflow
                 share = float(dr.mean((slope * (1.0 / scale)) ** 6)[0])
                 largest = max(largest, scale * share ** (1 / 6))
         return largest
@@ -98,7 +98,7 @@ class FacetKernel:
 
         Of each term the real part, then the imaginary part.
 
-        For a conductor, or, for an echo, a surface that turns the field round.
+        For a conductor, or, for a monostatic echo, a surface of coefficient -1.
         """
         inward = self._leg(pair[0])
         outward = inward if monostatic else self._leg(pair[1])
@@ -143,7 +143,7 @@ class FacetKernel:
 
     @staticmethod
     def normals_of(facets: Facets) -> Any:
-        """Return normals of the mean surface; None if nothing is rough."""
+        """Return normals of the mean surface; None if all facets are smooth."""
         return None if facets.relief is None else _single(facets.relief.normals)
 
     def _legs(self, inward: "_Leg", outward: "_Leg", *, monostatic: bool) -> Legs:
@@ -156,7 +156,7 @@ class FacetKernel:
         return Legs(inward.exact, outward.exact, sent, received)
 
     def _curvature(self, legs: Legs, side: Any, weights: Weights, *, monostatic: bool) -> Any:
-        """Work out what roughness adds to the weights, over what is common to all. [-]."""
+        """Return the curvature term of the weights, over the coefficient common to all. [-]."""
         mean, normals = side * mi.Vector3d(self.mean), side * mi.Vector3d(self.normals)
         upright = dr.dot(mean, normals)
         slope = mean - normals / dr.maximum(upright, 1e-6)
@@ -167,12 +167,12 @@ class FacetKernel:
         if isinstance(weights.material, Conductor):
             return mi.Float(added)
         mirror = 1.0 / half_space_mirror(weights.permittivity) if monostatic else 1.0 + 0j
-        # The kernel turns the field round.
+        # The kernel's sign is that of a coefficient of -1.
         added = added * Complex2d(-mirror.real, -mirror.imag)
         return Complex2f(mi.Float(added.real), mi.Float(added.imag))
 
     def _leg(self, end: Float[np.ndarray, " 3"]) -> "_Leg":
-        # Opaque: the same kernel serves all links.
+        # An opaque value, not a literal: one compiled kernel serves all links.
         towards = [
             dr.opaque(mi.Float64, float(place)) - axis
             for place, axis in zip(end, self.centres, strict=True)
@@ -200,7 +200,7 @@ def sum_links(
     monostatic: bool,
     advance: Callable[[], None] = lambda: None,
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the facets of each link: one kernel after the other, while other cores sum.
+    """Sum the facets of each link; kernels run one after the other, beside sums on other cores.
 
     Parameters
     ----------
@@ -209,13 +209,13 @@ def sum_links(
     pairs
         Transmitter and receiver of each link.
     weights
-        What each link's facets are weighted by.
+        Of each link's facets.
     total
         The sum over the band.
     monostatic
-        Whether each pair is one place.
+        Whether both ends of each pair are the same position.
     advance
-        Called once for each link that is done.
+        Called after each link.
 
     Returns
     -------

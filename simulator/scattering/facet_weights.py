@@ -1,4 +1,4 @@
-"""What one facet contributes beside its size: obliquity times reflection, and both ends' patterns.
+"""Weights of facets per size: obliquity times reflection, and both ends' antenna patterns.
 
 A :class:`Leg` holds distances and directions from one port to all facets, a
 :class:`MaterialPart` the facets of one material with their weights: Fresnel's coefficients on
@@ -34,12 +34,12 @@ from simulator.scattering.small_slope import (
 from simulator.scattering.weighted_curvature import half_space_mirror, middle_permittivity
 
 ROUGH_NODES = 4
-"""Fewest frequencies that the weights of rough lines are sampled at: over a third of an octave they
-are then interpolated to 1e-3 of what they add to the tangent plane's. [-]"""
+"""Fewest frequencies at which weights of rough lines are sampled: over a third of an octave, the
+interpolation error is then 1e-3 of their difference from the tangent plane's. [-]"""
 
 
 class MaterialPart:
-    """The facets of one material: how their sum over the band is sampled."""
+    """The facets of one material, and the sampling of their sum over the band."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class MaterialPart:
         ]
         if self.runs:
             self.count = max(count, ROUGH_NODES)
-        # Towards where it came from, facets reflect alike: the sum is multiplied once.
+        # Monostatic echoes have one coefficient for all facets: the sum is multiplied once.
         self.common: Complex[np.ndarray, " freqs"] | None = None
         if monostatic and not isinstance(self.material, Conductor):
             self.common = echo_coefficient(
@@ -75,7 +75,7 @@ class MaterialPart:
         self._lock = threading.Lock()
 
     def total(self, inward: "Leg", outward: "Leg", lit: np.ndarray) -> FrequencySum:
-        """Return the sum that samples the band as finely as these facets' angles need it."""
+        """Return the sum whose sampling of the band suffices for these facets' angles."""
         same = self.monostatic or isinstance(self.material, Conductor)
         lowest = 1.0
         if not same:
@@ -102,7 +102,7 @@ class MaterialPart:
         nodes: Float[np.ndarray, " nodes"],
         facets: Facets,
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Obliquity times reflection of smooth facets, and what stands for it on rough ones."""
+        """Obliquity times reflection of smooth facets; the small-slope weights of rough ones."""
         if self.share is not None:
             return self._rough_triangles(inward, outward, some, nodes, facets)
         smooth = np.flatnonzero(~facets.rough[some]) if self.runs else np.arange(some.size)
@@ -174,7 +174,7 @@ class MaterialPart:
     def _rough_line(
         self, number: int, side: float, nodes: Float[np.ndarray, " nodes"]
     ) -> tuple[RoughLine, DirectionGrid]:
-        """Return a run's line at these nodes, and its weights for echoes."""
+        """Return a run's rough line at these nodes, and its weights for monostatic echoes."""
         run, key = self.runs[number], (number, side, nodes.size)
         with self._lock:
             if key not in self._lines:
@@ -198,7 +198,7 @@ class MaterialPart:
         *,
         flat: bool,
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Reflect at the nodes; what is common to all facets is left out."""
+        """Return reflection coefficients at the nodes, without factors common to all facets."""
         if self.common is not None:
             return np.ones((1, len(some)))
         if self.monostatic and isinstance(self.material, Conductor):
@@ -218,7 +218,7 @@ class Leg:
         self.distance = np.sqrt(np.einsum("fx,fx->f", towards, towards))
         self.direction = towards / self.distance[:, None]
         self.cosine = np.einsum("fx,fx->f", self.direction, facets.normals)
-        # A surface does not hide itself by its own roughness: the mean surface has to face it.
+        # Roughness does not hide its own surface: the mean surface has to face the antenna.
         self.facing = self.cosine
         if facets.relief is not None:
             self.facing = np.einsum("fx,fx->f", self.direction, facets.relief.normals)

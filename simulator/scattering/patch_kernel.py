@@ -1,15 +1,15 @@
-r"""The sum over each patch of triangles, at a few frequencies and between given places: one kernel.
+r"""Kernel that sums each patch of triangles at a few frequencies, between given positions.
 
 The same physical optics as :mod:`simulator.scattering.physical_optics`, relative to the patch's
-centre: with the centre at :math:`\mathbf a` before an antenna and a triangle
-:math:`\boldsymbol\rho` off it,
+centre: with the vectors :math:`\mathbf a` from the centre to an antenna, and
+:math:`\boldsymbol\rho` from the centre to a triangle,
 
 .. math:: |\mathbf a - \boldsymbol\rho| - |\mathbf a| =
           \frac{\rho^2 - 2\,\mathbf a \cdot \boldsymbol\rho}
           {|\mathbf a - \boldsymbol\rho| + |\mathbf a|}
 
-which single precision gives to some nanometres. One lane sums one patch for one link, one
-triangle after the other: the result does not depend on the number of threads.
+which has an error of some nanometres in single precision. One lane sums one patch for one link,
+triangle by triangle: the result does not depend on the number of threads.
 """
 
 import math
@@ -44,14 +44,14 @@ Complex2f: Any = mi.Complex2f
 
 
 SHAPE_NODES = 3
-"""Frequencies at which a triangle's transform is worked out; in between it is a parabola. [-]"""
+"""Frequencies at which a triangle's transform is evaluated; between, it is a parabola. [-]"""
 
 ANGLES = 2048
 """Cosines of incidence at which a dielectric's coefficients are tabulated. [-]"""
 
 
 class PatchKernel:
-    """Patches as the kernel reads them."""
+    """Patches in the kernel's arrays, and the sums over them."""
 
     def __init__(
         self,
@@ -84,15 +84,15 @@ class PatchKernel:
     ) -> Complex64[np.ndarray, "patches links nodes"]:
         """Sum each patch for each link, relative to the delay of its centre.
 
-        Times :math:`j` it is the S-parameter; for echoes of a dielectric its reflection
-        coefficient at normal incidence is left out, and a conductor's is in.
+        Multiplied by :math:`j` it is the S-parameter; monostatic echoes of a dielectric are without
+        its reflection coefficient at normal incidence, those of a conductor with it.
 
         Parameters
         ----------
         links
             The links.
         mask
-            Which triangles each link sees, in the patches' order; without, all.
+            Which triangles each link sees, in the patches' order; None: all.
         """
         count, patches = len(links.receivers), self.patches.count
         lane = dr.arange(mi.UInt32, count * patches)
@@ -116,7 +116,7 @@ class PatchKernel:
             across = 0.5 * dr.cross(one, other)
             first = inward.leg(offset)
             second = first if links.echo else outward.leg(offset)
-            mean: Any = across  # the side of it that faces both ends is lit
+            mean: Any = across  # its side that faces both ends is illuminated
             if self.share is not None:
                 mean = mi.Vector3f(
                     *(dr.gather(mi.Float, self.values, at + 9 + axis) for axis in range(3))
@@ -170,7 +170,7 @@ class PatchKernel:
         return result
 
     def _shapes(self, first: Any, second: Any) -> list[Any]:
-        """Transform of a triangle at all nodes, by way of a few."""
+        """Transform of a triangle at all nodes, interpolated from :data:`SHAPE_NODES`."""
         exact = []
         for node in self.few:
             wave = dr.opaque(mi.Float, 2 * math.pi * float(node) / speed_of_light)
@@ -188,9 +188,9 @@ class PatchKernel:
         return shapes
 
     def _phasors(self, longer: Any) -> list[Any]:
-        """Turn by the difference of length to the patch's centre, at all nodes.
+        """Phase factors of the difference of length to the patch's centre, at all nodes.
 
-        Chebyshev nodes lie in pairs about their middle.
+        Chebyshev nodes are in pairs, symmetric about their middle.
         """
         middle = 0.5 * (self.nodes[0] + self.nodes[-1])
         scale = 2 * math.pi / speed_of_light
@@ -205,7 +205,7 @@ class PatchKernel:
         return phasors
 
     def _reflector(self, inward: "_End", outward: "_End", *, echo: bool) -> Any:
-        """Return what gives the coefficients of a triangle from both directions."""
+        """Return the function of both directions that gives a triangle's coefficients."""
         if echo:
             constant = _Real(mi.Float(-1.0 if isinstance(self.material, Conductor) else 1.0))
             return lambda legs: constant
@@ -230,7 +230,7 @@ class PatchKernel:
         return dielectric
 
     def _legs(self, inward: "_End", outward: "_End", first: Any, second: Any) -> Legs:
-        """Both directions with the antennas' fields; those are asked for where they count."""
+        """Both directions with the antennas' fields, which are evaluated only if needed."""
         mirrored = outward is inward
         if mirrored and self.share is None:
             return Legs(first, second, first, second)
@@ -239,7 +239,7 @@ class PatchKernel:
         return Legs(first, second, sent, received)
 
     def _curvature(self, legs: Legs, side: Any, normals: tuple[Any, Any], *, echo: bool) -> Any:
-        """Work out what roughness adds to a triangle's weight; complex for a dielectric. [m²]."""
+        """Return the curvature term of a triangle's weight; complex for a dielectric. [m²]."""
         mean, across = (side * normal for normal in normals)
         area = dr.dot(mean, across)
         slope = mean - across / dr.maximum(area, 1e-30)
@@ -259,7 +259,7 @@ class PatchKernel:
         return weight
 
     def _tabulated(self, cosine: Any) -> list[list[tuple[Any, Any]]]:
-        """Look up the coefficients at a cosine, and their slopes, by cubic interpolation."""
+        """Return the coefficients at a cosine, and their derivatives, by cubic interpolation."""
         if self.table is None:
             cosines = np.linspace(0.0, 1.0, ANGLES + 1)
             values = reflection(self.material, self.nodes, cosines)
@@ -299,7 +299,7 @@ class _Real:
 class _Leg:
     direction: Any  # from the triangle to the antenna
     distance: Any
-    longer: Any  # than from the patch's centre
+    longer: Any  # distance less that from the patch's centre [m]
 
 
 class _End:
@@ -362,7 +362,7 @@ def _product(one: Any, other: Any) -> tuple[Any, Any]:
 
 
 def _weighed(gamma: Any, oblique: Any, extra: Any) -> Any:
-    """Weight of a triangle: its mirror's, and what roughness adds."""
+    """Weight of a triangle: the tangent plane's and the curvature term."""
     if isinstance(gamma, _Real):
         if extra is None:
             return _Real(gamma.value * oblique)

@@ -1,4 +1,4 @@
-"""Links over any number of triangles: patch by patch, a few frequencies and places at a time."""
+"""Sums over any number of triangles: by patches, at a few frequencies and positions."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -26,29 +26,29 @@ COEFFICIENT_ACCURACY = 1e-4
 """Largest error of the interpolation of a coefficient of reflection over the band. [-]"""
 
 FACETS_AT_ONCE = 2_000_000
-"""Triangles whose visibility is looked at in one go. [-]"""
+"""Triangles whose visibility is tested in one batch. [-]"""
 
 TABLE_AT_ONCE = 2**28
-"""Triangles times links whose visibility may have to be kept: 256 MiB. [-]"""
+"""Triangles times links whose visibility may be held at one time: 256 MiB. [-]"""
 
 LANES_AT_ONCE = 1_000_000
 """Patches times links in one kernel: 200 MB of sums. [-]"""
 
 MASKED_AT_ONCE = 2**27
-"""Triangles times links of which some are seen: 128 MiB. [-]"""
+"""Triangles times links of one visibility mask: 128 MiB. [-]"""
 
 LINKS_AT_ONCE = 32
-"""Links that are interpolated by one matrix product, on one thread. [-]"""
+"""Links interpolated by one matrix product, on one thread. [-]"""
 
 
 Look = Callable[[Int[np.ndarray, " facets"]], Seen]
-"""Tells over which links triangles of the whole set are seen."""
+"""Returns over which links triangles of the whole set are seen."""
 
 Factor = Callable[
     [Links, Float[np.ndarray, "patches 3"], Float[np.ndarray, " nodes"]],
     Complex[np.ndarray, "patches links nodes"],
 ]
-"""What is multiplied to the sum over a patch; varies as slowly as an antenna's pattern."""
+"""Factor of the sum over a patch, which varies as slowly as an antenna's pattern."""
 
 
 def scattered_by_patches(
@@ -62,22 +62,22 @@ def scattered_by_patches(
     factor_nodes: int = 1,
     advance: Callable[[], None] = lambda: None,
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the facets' echoes for each link, spherical waves.
+    """Sum the facets' scattering for each link, with spherical waves.
 
     Parameters
     ----------
     facets
         Triangles.
     links
-        Between which places.
+        Positions and patterns of both ends.
     look
-        Which triangles are seen.
+        Visibility test of triangles.
     frequencies
         Uniform grid. [Hz]
     chosen
-        Which of the facets are summed; without, all.
+        Which of the facets are summed; None: all.
     factor, factor_nodes
-        What else is multiplied, and at how many frequencies it has to be known.
+        Further factor of each patch's sum, and the frequencies at which it is sampled.
     advance
         Called once for each link, as the work proceeds.
 
@@ -113,7 +113,7 @@ def scattered_by_patches(
 
 
 def _blocks(patches: Patches, most: int) -> Iterator[Patches]:
-    """Take consecutive patches together up to that many triangles."""
+    """Yield blocks of consecutive patches with up to that many triangles."""
     begin = 0
     while begin < patches.count:
         end = int(np.searchsorted(patches.first, patches.first[begin] + most, side="right")) - 1
@@ -123,7 +123,7 @@ def _blocks(patches: Patches, most: int) -> Iterator[Patches]:
 
 
 class _Work:
-    """One material's patches: at which frequencies and places they are summed."""
+    """One material's patches, and the frequencies and positions at which they are summed."""
 
     def __init__(
         self,
@@ -136,7 +136,7 @@ class _Work:
     ) -> None:
         material, self.share = kind
         start, stop = float(frequencies[0]), float(frequencies[-1])
-        delays = 4 * float(patches.radii.max()) / speed_of_light  # there and back, about the centre
+        delays = 4 * float(patches.radii.max()) / speed_of_light  # both legs, ± radius
         nodes = nodes_needed(delays, stop - start, accuracy=ACCURACY)
         if not links.echo:
             nodes += reflection_nodes(material, start, stop, accuracy=COEFFICIENT_ACCURACY) - 1
@@ -169,7 +169,7 @@ class _Work:
     def _by_nodes(
         self, patches: Patches
     ) -> Iterator[tuple[Patches, Aperture | None, tuple[int, ...] | None]]:
-        """Take patches together that need the same nodes."""
+        """Yield groups of patches that need the same nodes."""
         count = len(self.links.receivers)
         if self.aperture is None or count < 3:
             yield patches, None, None
@@ -237,6 +237,6 @@ def _product(counts: tuple[int, ...] | None, otherwise: int) -> int:
 
 
 def _blocks_of(patches: Patches, most: int) -> Iterator[Patches]:
-    """Take at most so many consecutive patches together."""
+    """Yield blocks of at most that many consecutive patches."""
     for begin in range(0, patches.count, max(1, most)):
         yield patches.patch_range(begin, min(begin + max(1, most), patches.count))

@@ -33,18 +33,20 @@ from simulator.scattering.facet_weights import Leg, MaterialPart
 from simulator.scattering.triangle_transform import triangle_transform
 
 SAMPLES_AT_ONCE = 4_000_000
-"""Facets times nodes that are evaluated in one go: 64 MB for each complex quantity."""
+"""Facets times nodes evaluated in one batch: 64 MB for each complex quantity. [-]"""
 
 FEWEST_FOR_KERNEL = 200_000
-"""Triangles times links from which the kernel is worth compiling, a third of a second. [-]"""
+"""Fewest triangles times links at which compiling the kernel (a third of a second) saves time.
+[-]"""
 
 TRIANGLE_ACCURACY = 8e-4
-"""Error of interpolating a triangle's farthest corner over the band. The average over a
-triangle takes at most an eighth of that to second order, a fortieth to third: the moments of
-its points about the centroid. [-]"""
+"""Interpolation error over the band of the phase factor at a triangle's farthest corner. In the
+average over the triangle, at most an eighth of it remains in second order and a fortieth in third,
+by the moments of its points about the centroid. [-]"""
 
 MOST_TRIED, MARGIN = 16, 1.1
-"""Links of which the facets' slopes are looked at, and what the others may exceed them by."""
+"""Links at which the facets' delay slopes are evaluated, and the factor by which those of other
+links may exceed them. [-]"""
 
 
 def scattered(
@@ -56,7 +58,7 @@ def scattered(
     waves: Waves,
     advance: Callable[[], None] = lambda: None,
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the facets' echoes for each link from a transmitting to a receiving port.
+    """Sum the facets' scattering for each link from a transmitting to a receiving port.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def scattered(
     waves
         Spherical (S-parameters) or cylindrical (fields of a unit line source).
     advance
-        Called once for each link that is done.
+        Called after each link.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def scattered(
         advance()
         return spectrum
 
-    # Threads change nothing in the result: each link is summed by one of them.
+    # The number of threads does not change the result: each link is summed by one thread.
     with ThreadPoolExecutor(thread_count()) as pool:
         return np.stack(list(pool.map(link, range(len(receive.positions)))))
 
@@ -122,7 +124,7 @@ def scattered(
 def _suits_the_kernel(
     facets: Facets, transmit: Ports, receive: Ports, parts: list[MaterialPart]
 ) -> bool:
-    """Tell whether these are many triangles that reflect alike over the band."""
+    """Return whether these are many triangles whose reflection is constant over the band."""
     many = not facets.flat and facets.count * len(receive.positions) >= FEWEST_FOR_KERNEL
     alike = all(part.monostatic or isinstance(part.material, Conductor) for part in parts)
     return many and alike and transmit.nodes == receive.nodes == 1
@@ -182,7 +184,7 @@ def _by_kernel(
                 advance()
 
         sums = sum_links(kernel, pairs, weights, total, monostatic=monostatic, advance=told)
-        # The kernel turns the field round; what is common to all facets does so itself.
+        # The kernel's coefficient is -1; one that is common to all facets replaces it.
         spectrum += sums if part.common is None else -part.common * sums
     return 1j * spectrum
 

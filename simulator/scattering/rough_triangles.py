@@ -1,4 +1,4 @@
-"""Weights of rough triangles beyond the tangent plane, in NumPy."""
+"""Weighted curvature of rough triangles, in NumPy."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -18,18 +18,18 @@ def rough_weights(
     permittivity: complex,
     share: float,
 ) -> Float[np.ndarray, " facets"] | Complex[np.ndarray, " facets"]:
-    """Work out what roughness adds to obliquity times reflection, over the facets' areas.
+    """Return the curvature term added to obliquity times reflection, per area of the facets. [-].
 
     Parameters
     ----------
     facets
         Triangles that are rough.
     side
-        1 where the antennas are on the normals' side, -1 on the other.
+        1 if the antennas are on the normals' side, -1 on the other. [-]
     legs
         To both antennas.
     material, permittivity
-        What the facets are made of.
+        Of the facets.
     share
         See :class:`simulator.geometry.facets.Relief`.
     """

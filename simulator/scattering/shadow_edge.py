@@ -1,7 +1,7 @@
-r"""What a straight edge diffracts into and beside its shadow, uniform across the boundary (UTD).
+r"""Diffraction by a straight edge, uniform across the shadow boundary (UTD).
 
-A wedge of conductor with the exterior angle :math:`n\pi`, met by a wave from the angle
-:math:`\varphi'`, sends towards :math:`\varphi`, in two dimensions over distances s' and s [1]_,
+A conducting wedge with the exterior angle :math:`n\pi`, illuminated from the angle
+:math:`\varphi'`, diffracts towards :math:`\varphi`, in two dimensions over distances s' and s [1]_,
 
 .. math:: E = E_i \, D \, \frac{e^{-jks}}{\sqrt s}, \qquad
           D = -\frac{e^{-j\pi/4}}{2n\sqrt{2\pi k}} \sum_{\pm} \left[
@@ -11,9 +11,9 @@ A wedge of conductor with the exterior angle :math:`n\pi`, met by a wave from th
 with :math:`\beta^\pm = \varphi \pm \varphi'`, :math:`L = s s'/(s + s')`,
 :math:`a^\pm(\beta) = 2\cos^2(\pi n N^\pm - \beta/2)` and Fresnel's transition function
 :math:`F(x) = 2j\sqrt x\, e^{jx} \int_{\sqrt x}^\infty e^{-j\tau^2} d\tau`; the second term is
-added, not taken off, for the magnetic field along the edge. On the shadow boundary it is half of
-the incident field, so that the sum with the straight wave is continuous. What absorbs has no
-reflection, and no second term: Kirchhoff's black screen; an opaque dielectric is taken for one
+added, not subtracted, for the magnetic field along the edge. On the shadow boundary it is half of
+the incident field, so that the sum with the direct wave is continuous. An absorber does not
+reflect, and has no second term: Kirchhoff's black screen; an opaque dielectric is treated as one
 (heuristic).
 
 References
@@ -27,7 +27,8 @@ from jaxtyping import Complex, Float
 from scipy.special import wofz
 
 BOUNDARY = 1e-7
-"""Angle to which a boundary is approached, where a cotangent has its pole. [rad]"""
+"""Least distance from a boundary at which the coefficient is evaluated: a cotangent has its pole
+there. [rad]"""
 
 
 def transition(x: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
@@ -58,7 +59,7 @@ def wedge_coefficient(
     wavenumbers
         [1/m]
     exterior
-        Angle that is filled with air, over π. [-]
+        Exterior angle (in air) over π. [-]
     reflection
         Of the faces: -1 for the electric field along the edge, 1 for the magnetic one, 0: none.
     """

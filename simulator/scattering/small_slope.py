@@ -1,4 +1,4 @@
-r"""Rough lines beyond the tangent plane: Voronovich's small-slope approximation of second order.
+r"""Scattering by rough lines: Voronovich's small-slope approximation of second order.
 
 Along the mean course of a line, with heights h and unit vectors :math:`\hat s_i, \hat s_s` from it
 to both antennas, let t be their components along the line, q those along its normal, :math:`Q = q_i
@@ -8,11 +8,11 @@ to both antennas, let t be their components along the line, q those along its no
           N = \frac{2 B}{Q} + jk\, (E * h)
 
 in place of :math:`\Gamma (\cos\theta_i + \cos\theta_s)`. B is the kernel of perturbation theory
-of first order (Bragg scattering); E completes what :math:`e^{jkQh}` gives in the second order to
-what perturbation theory of second order gives. It works on the heights as a filter, and holds how
-waves along the surface scatter again: the coherent loss of short waves with its phase, and grazing
-incidence, where tangent planes would hide each other. With p the wavenumber between both orders,
-:math:`q(p) = \sqrt{1 - p^2}`, evanescent waves included,
+of first order (Bragg scattering); E corrects the second-order term of :math:`e^{jkQh}` to that of
+second-order perturbation theory. It acts on the heights as a filter, and describes double
+scattering by waves along the surface: the coherent loss of short-waved roughness with its phase,
+and grazing incidence, where tangent planes would shadow each other. With p the intermediate
+wavenumber of double scattering, :math:`q(p) = \sqrt{1 - p^2}`, evanescent waves included,
 
 =========================  =======================================================================
 conductor, vertical        :math:`B = -2 q_i q_s, \quad
@@ -29,12 +29,12 @@ dielectric, horizontal     :math:`B = \tfrac12 [(\varepsilon-1) q_i q_s (1-R_i)(
 with :math:`q'(p) = \sqrt{\varepsilon - p^2}` and :math:`\gamma = q - q'`. "Vertical" is the
 electric field along z (TM of the cross-section, TE of the plane of incidence). B of a conductor and
 E of both verticals follow [1]_, [2]_; all were derived anew from the boundary conditions.
-:math:`Z(p) = k^2 \langle (\xi h)^2 / q(p+\xi) \rangle`, over the line's own spectrum, is what
-roughness takes from a wave along a conductor in the horizontal polarization, which would otherwise
-run without loss (the smoothing method's mean wave [3]_).
+:math:`Z(p) = k^2 \langle (\xi h)^2 / q(p+\xi) \rangle`, over the line's own spectrum, is the loss
+by roughness of a wave along a conductor in the horizontal polarization, which would otherwise
+travel without loss (the smoothing method's mean wave [3]_).
 
-A slab's back lies flat behind its rough front. Its coefficients enter B as a whole, and flat walls
-stay as they are: what the slab's R has beyond the half space's is added to N as
+A slab's back is flat behind its rough front. The slab's coefficients enter B, and flat walls are
+unchanged: the difference of the slab's R from the half space's is added to N as
 :math:`2 K R / Q` of the flat wall and, to first order of heights, :math:`2jk (B - KR) h`; here
 :math:`K = \tfrac12 |\hat s_i + \hat s_s|^2` and R is that at half the angle between the antennas.
 
@@ -64,20 +64,20 @@ from simulator.materials.facet_reflection import over_angles
 from simulator.materials.fresnel_slab import Dielectric, Material
 
 STEP = 0.01
-"""Step of the direction's component along the line, over 1, between which fields of the filter are
-interpolated: waves that come from x away turn by k x · 0.01 over it, 0.3 rad at 5 λ. [-]"""
+"""Step of the direction's component along the line (a cosine) between filtered heights, which are
+interpolated: over it, waves from a distance x change phase by k x · 0.01, 0.3 rad at 5 λ. [-]"""
 
 REACH = 0.01
-"""Length beyond an open line's ends over which its heights fade: 10 λ. [m]"""
+"""Length beyond an open line's ends over which its heights are tapered to 0: 10 λ. [m]"""
 
 LOSS = 1e-3
-"""Imaginary part of 1 - p² that keeps a wave along the line finite on its grid. [-]"""
+"""Imaginary part of 1 - p², which keeps 1/q finite for a wave along the line. [-]"""
 
 SPECTRUM_BINS = 256
 """Bins of a line's spectrum for Z. [-]"""
 
 MOST_ALONG = 0.9999
-"""Most grazing component along a line that weights are worked out for: 0.8° over it. [-]"""
+"""Largest component of a direction along a line, for evaluating weights: 0.8° over it. [-]"""
 
 Ways = tuple[Float[np.ndarray, "#facets"], Float[np.ndarray, "#facets"]]
 """Components of the directions to an antenna: along the line, and along its normal (> 0)."""
@@ -85,7 +85,7 @@ Ways = tuple[Float[np.ndarray, "#facets"], Float[np.ndarray, "#facets"]]
 
 @dataclass(frozen=True, kw_only=True)
 class Kernels:
-    """Of the flat and the slightly rough surface, signs included."""
+    """Scattering kernels of the slightly rough and of the flat surface, signs included."""
 
     bragg: Complex[np.ndarray, "_ _"]  # B
     mirror: Complex[np.ndarray, "_ _"]  # K R
@@ -113,7 +113,7 @@ def kernels(
     polarization
         Of the antennas.
     half_space
-        Leave out what a slab's back reflects.
+        Whether reflection by a slab's back is left out.
     """
     (t_i, q_i), (t_s, q_s) = transmit, receive
     mirror = 0.5 * ((t_i + t_s) ** 2 + (q_i + q_s) ** 2)
@@ -144,7 +144,7 @@ def _coefficient(
     vertical: bool,
     half_space: bool,
 ) -> Complex[np.ndarray, "nodes facets"]:
-    """Fresnel's coefficients, interpolated between angles where those are many."""
+    """Return Fresnel's coefficients, interpolated over angle if there are many facets."""
     of = replace(material, thickness=np.inf) if half_space else material
     both = over_angles(of, frequencies, cosines)
     return np.asarray(both.te if vertical else both.tm)
@@ -156,7 +156,7 @@ def reflection_of_front(
     *,
     polarization: Polarization,
 ) -> Complex[np.ndarray, " nodes"]:
-    """Return a dielectric's coefficient at normal incidence, without what its back returns."""
+    """Return a dielectric's coefficient at normal incidence, without reflection by its back."""
     assert isinstance(material, Dielectric)
     one = _coefficient(material, np.ones(1), frequencies, polarization == "vertical", True)
     return np.asarray(one[:, 0])
@@ -164,9 +164,9 @@ def reflection_of_front(
 
 @dataclass(frozen=True, kw_only=True)
 class RoughLine:
-    """One run of facets, of one material, at the frequencies that its weights are sampled at.
+    """One run of facets of one material, at the frequencies at which its weights are sampled.
 
-    Filtered heights are worked out once for each direction of a grid, at all facets.
+    Filtered heights are computed once for each direction of a grid, at all facets, and cached.
     """
 
     heights: Float[np.ndarray, " facets"]  # [m]
@@ -194,10 +194,10 @@ class RoughLine:
         some
             Which facets; None: all.
         side
-            1 where the antennas are on the side that heights rise to, -1 on the other. [-]
+            1 if the antennas are on the side of positive heights, -1 on the other. [-]
         monostatic
-            Whether both are the same. A slab's back is left out then: it changes the echo of all
-            facets alike, but for the angle.
+            Whether both are the same. A slab's back is then left out: except for the dependence
+            on angle, it changes the echo of all facets by one factor.
         """
         heights = self.heights if some is None else self.heights[some]
         height = side * heights
@@ -224,7 +224,7 @@ class RoughLine:
         side: float,
         monostatic: bool = False,
     ) -> Complex[np.ndarray, "nodes facets"]:
-        """Evaluate what E adds, over 2B/Q. Parameters are those of :meth:`weights`. [-]."""
+        """Evaluate the term of E over 2B/Q. Parameters are those of :meth:`weights`. [-]."""
         heights = self.heights if some is None else self.heights[some]
         height = side * heights
         (t_i, q_i), (t_s, q_s) = transmit, receive
@@ -283,7 +283,7 @@ class RoughLine:
     def _loss(
         self, between: Float[np.ndarray, "nodes waves"]
     ) -> Complex[np.ndarray, "nodes waves"]:
-        """Return what roughness takes from waves along the line, Z. [-]."""
+        """Return Z, the loss of waves along the line by roughness. [-]."""
         window = np.hanning(self.heights.size) if not self.closed else 1.0
         power = np.abs(np.fft.fft(self.heights * window)) ** 2
         power *= np.mean(self.heights**2) / max(float(power.sum()), np.finfo(float).tiny)
@@ -301,16 +301,15 @@ class RoughLine:
 
 
 class DirectionGrid:
-    """What depends on the facet and on one direction: known on a grid of directions.
+    """A function of the facet and of one direction, tabulated on a grid of directions.
 
-    Between them it is interpolated linearly, from both antennas' directions alike: which of them
-    transmits makes no difference.
+    Interpolation is linear and symmetric in both antennas' directions, so links stay reciprocal.
     """
 
     def __init__(
         self, at: Callable[[float], Complex[np.ndarray, "*parts facets"]], facets: int
     ) -> None:
-        """Prepare a function of the direction's component along the line."""
+        """Take a function of the direction's component along the line."""
         self._evaluate, self._facets = at, facets
         self._half = math.ceil(1 / STEP)
         self._known = np.zeros(2 * self._half + 1, dtype=bool)
@@ -337,14 +336,14 @@ class DirectionGrid:
         for index in range(low, high + 1):
             if self._known[index]:
                 continue
-            # Grazing along the line, the normal component of the grid's last place would be 0.
+            # At grazing, the normal component of the grid's last direction would be 0.
             found = self._evaluate(
                 float(np.clip((index - self._half) * STEP, -MOST_ALONG, MOST_ALONG))
             )
             if self._values is None:
                 self._parts = found.shape[:-1]
                 shape = (self._known.size, self._facets, math.prod(self._parts))
-                self._values = np.zeros(shape, dtype=np.complex64)  # pages are taken when written
+                self._values = np.zeros(shape, dtype=np.complex64)  # allocated when written
             self._values[index] = found.reshape(-1, self._facets).T
             self._known[index] = True
         assert self._values is not None
@@ -352,7 +351,7 @@ class DirectionGrid:
 
 
 def echo_weights(line: RoughLine, *, side: float) -> DirectionGrid:
-    """Return the weights of a line for antennas that receive what they send."""
+    """Return the weights of a line for monostatic echoes."""
 
     def at(along: float) -> Complex[np.ndarray, "nodes facets"]:
         way = np.array([along]), np.array([np.sqrt(1 - along**2)])
@@ -366,7 +365,7 @@ def _twice_scattered(
     near: Float[np.ndarray, "#facets"],
     far: Float[np.ndarray, "#facets"],
 ) -> Complex[np.ndarray, "nodes facets"]:
-    """Combine the fields of 1, p and p² to those of (1 - near p)(1 + far p)."""
+    """Combine the filtered heights of 1, p and p² to that of (1 - near p)(1 + far p)."""
     return np.asarray(fields[0] + (far - near) * fields[1] - near * far * fields[2])
 
 
@@ -380,11 +379,11 @@ def normal_component(
 
 
 def extended(heights: Float[np.ndarray, " n"], step: float) -> Float[np.ndarray, " more"]:
-    """Let an open line's heights go on, turned about its ends, and fade; periodic then. [m].
+    """Extend an open line's heights point-symmetrically about its ends, tapered; periodic. [m].
 
-    Heights are those of facets' centres, so the line ends half a step beyond the last. Turned about
-    that end it goes on without a kink. Turned about the last centre it repeats that height: the
-    echo's error then falls with the spacing, not with its square.
+    Heights are those of facets' centres, so the line ends half a step beyond the last one.
+    Symmetry about that end has no kink. Symmetry about the last centre would repeat its height, and
+    the echo's error would fall with the spacing, not with its square.
     """
     count = min(round(REACH / step), heights.size - 1)
     fade = 0.5 * (1 + np.cos(np.pi * (np.arange(count) + 0.5) / count))

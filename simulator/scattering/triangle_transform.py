@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 SERIES_DEGREE = 16
-"""Terms of the series: corner phases below π leave less than π¹⁷/17! = 8e-7 of the sum. [-]"""
+"""Degree of the series: for corner phases below π the remainder is below π¹⁷/17! = 8e-7. [-]"""
 
 
 def triangle_transform(first: Any, second: Any) -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-r"""What a rough facet scatters beyond the tangent plane: weighted curvature, both polarizations.
+r"""Weighted curvature approximation of rough facets, beyond the tangent plane, both polarizations.
 
 With unit vectors :math:`\hat u` from a facet to the two antennas, their fields' vectors
 :math:`\hat e`, :math:`\mathbf q = \hat u_t + \hat u_r`, the mean surface's normal
@@ -21,14 +21,14 @@ facet's tangent-plane weight :math:`\Gamma (\hat n_f \cdot \mathbf q)\, dA` then
 .. math:: -2 \Bigl[F(\hat n) \frac{\mathbf q_\parallel \cdot \nabla h}{q_\parallel^2}
           + \frac{g}{q_z} F(\mathbf q / q_z + \nabla h) \Bigr]\, \hat n \cdot \hat n_f\, dA
 
-the weighted curvature approximation [1]_, [2]_, in a form that leaves a flat surface as it is:
-the first term is B - K after an integration by parts, the second the curvature's. To first order
-in the heights the sum is B exactly, and a facet that mirrors one antenna into the other weighs
-what the tangent plane says.
+the weighted curvature approximation [1]_, [2]_, in a form without effect on a flat surface: the
+first term is B - K after an integration by parts, the second the curvature's. To first order in
+the heights the sum is exactly B; a facet that specularly connects the antennas keeps its
+tangent-plane weight.
 
-Of slopes much shorter than the wavelength the second term would make too much [2]_; full wave
-agrees when slopes are smoothed over a sixth of the wavelength. The share g is what such smoothing
-leaves of the slopes' variance.
+For slopes much shorter than the wavelength the second term is too large [2]_; it agrees with full
+wave if slopes are smoothed over a sixth of the wavelength. The share g is the part of the slopes'
+variance left by this smoothing.
 
 Written for arrays of NumPy and Dr.Jit alike; a vector is indexed by its axis first.
 
@@ -49,11 +49,11 @@ from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.numerics.vectors import added, at_least, cross, dot, scaled, square_root
 
 LEAST_LATERAL = 1e-8
-"""Squared lateral part of q below which a link counts as specular: F is then below the rounding
-of single precision. [-]"""
+"""Squared lateral component of q below which a link counts as specular: F is then below the
+rounding of single precision. [-]"""
 
 LEAST_NORMAL = 1e-3
-"""Part of q along the normal below which both antennas graze the surface. [-]"""
+"""Component of q along the normal below which both antennas are at grazing angles. [-]"""
 
 
 class ConductorKernel:
@@ -90,7 +90,7 @@ class DielectricKernel:
         inner = square_root(permittivity - 1.0 + half)
         electric, magnetic = cosine + inner, permittivity * cosine + inner
         across = cross(legs.receive, legs.transmit)
-        # (R_TE + R_TM) times the share of TE, with both zeros divided out.
+        # (R_TE + R_TM) times the share of TE, without their common 0/0 in the monostatic case.
         both = -0.5 * (permittivity - 1.0) / (electric * magnetic)
         both = both * (dot(legs.received, across) * dot(legs.sent, across) / half)
         magnetic_mirror = (permittivity * cosine - inner) / magnetic
@@ -104,7 +104,7 @@ class DielectricKernel:
         one = self._boundary(here)
         other = one if legs.transmit is legs.receive else self._boundary(there)
         along = dot(legs.sent, legs.received) - sent * received
-        # Of the fields within the planes of incidence, the part along the mean plane.
+        # Components along the mean plane of the fields within the planes of incidence.
         first = dot(legs.sent, legs.receive) - sent * there
         second = dot(legs.received, legs.transmit) - received * here
         both = dot(legs.transmit, legs.receive) - here * there
@@ -129,7 +129,7 @@ class DielectricKernel:
 def scattering_kernel(
     material: Material, legs: Legs, permittivity: Any
 ) -> ConductorKernel | DielectricKernel:
-    """Return B - K of a material; the permittivity is a conductor's if there is none."""
+    """Return B - K of a material; a conductor needs no permittivity."""
     if isinstance(material, Conductor):
         return ConductorKernel(legs)
     return DielectricKernel(legs, permittivity)
@@ -155,7 +155,7 @@ def curvature_weight(
     slope: Any,
     share: float,
 ) -> Any:
-    """Work out what is added to a facet's tangent-plane weight, over its mean area. [-].
+    """Return the term added to a facet's tangent-plane weight, per mean area. [-].
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def curvature_weight(
     slope
         Gradient of the heights, along the mean surface. [-]
     share
-        Of the slopes' variance that smoothing leaves, see :func:`slope_share`. [-]
+        Of the slopes' variance left by smoothing, see :func:`slope_share`. [-]
     """
     both = added(legs.transmit, legs.receive)
     normal = at_least(dot(both, mean), LEAST_NORMAL)
