@@ -1,7 +1,7 @@
 """Fields over several surfaces, of which one may scatter diffusely.
 
-In two dimensions by iterated physical optics, wall then target; in three by specular legs plus the
-diffuse part of each wall. Few frequencies carry the band; the rest is interpolated.
+In two dimensions by iterative physical optics, wall then target; in three by specular legs plus the
+diffuse part of each wall. Waves are computed at few frequencies and interpolated over the band.
 """
 
 import lazy_loader

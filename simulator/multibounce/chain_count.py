@@ -1,4 +1,4 @@
-"""Chains of surfaces in two dimensions: which there are, and how much work they make."""
+"""Chains of surfaces in two dimensions: their enumeration, and the amount of work."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,37 +14,36 @@ MOST_LINKS = 2**35
 or a few. [-]"""
 
 PORTS_PER_LINK = 32
-"""Antennas whose products take as long as the phase of the link that they share. [-]"""
+"""Antennas whose products take as long as the phase factor of the link that they share. [-]"""
 
 OUTLINE = 64
-"""Points that stand for a surface where only its directions are asked for. [-]"""
+"""Points that represent a surface where only directions matter. [-]"""
 
 Sees = MutualVisibility
-"""Tells which facets of two faces see each other, and through what."""
+"""Returns which facets of two faces see each other, and through which slabs."""
 
 
 def chains_to(
     target: int, faces: Sequence[Face], sees: Sees, seen_directly: Sequence[bool], most: int
 ) -> Iterator[tuple[int, ...]]:
-    """Find the ways over one to so many faces to another one.
+    """Yield the chains of 1 to ``most`` faces that lead to another one.
 
     Parameters
     ----------
     target
-        Index of the face that they lead to.
+        Index of the last face.
     faces
         Sides of the surfaces.
     sees
-        Their mutual visibility, past everything or through slabs.
+        Their mutual visibility, in line of sight or through slabs.
     seen_directly
-        Which faces may come first.
+        Which faces may be the first.
     most
-        Faces before the target.
+        Most faces before the target.
 
     Yields
     ------
-    Indices of faces, in the order in which they are met, the target left out. No face is
-    followed by one of the same surface.
+    Indices of faces in order, without the target. No face is followed by one of the same surface.
     """
     if most < 1:
         return
@@ -58,7 +57,7 @@ def chains_to(
 
 
 def check_chains(faces: Sequence[Face], *, max_bounces: int, elements: int, users: int) -> None:
-    """Refuse chains of more surfaces than can be summed, before anything is.
+    """Refuse chains of more surfaces than can be summed, before any summation.
 
     Parameters
     ----------
@@ -67,14 +66,14 @@ def check_chains(faces: Sequence[Face], *, max_bounces: int, elements: int, user
     max_bounces
         Most surfaces of a chain.
     elements
-        Antennas that echoes are simulated for.
+        Antennas of the echo.
     users
-        Antennas that send pilots.
+        Antennas that transmit pilots.
 
     Raises
     ------
     ScenarioError
-        If there is too much to be summed; names the most bounces that are possible.
+        If there are too many links; the message names the largest possible number of bounces.
     """
     links = _links_of_chains(faces, max_bounces)
     work = [
@@ -108,7 +107,7 @@ def _links_of_chains(faces: Sequence[Face], max_bounces: int) -> list[float]:
 
 
 def _face(one: Face, other: Face) -> bool:
-    """Tell whether some of either face lies before some of the other; the surfaces must differ."""
+    """Return whether parts of two faces of different surfaces face each other."""
     return one.surface != other.surface and _before(one, other) and _before(other, one)
 
 
@@ -119,5 +118,5 @@ def _before(face: Face, other: Face) -> bool:
 
 
 def outline(values: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "some 2"]:
-    """Choose at most some :data:`OUTLINE` evenly, of many."""
+    """Return about :data:`OUTLINE` evenly chosen values, if there are more."""
     return values[:: max(1, len(values) // OUTLINE)]

@@ -1,18 +1,19 @@
-r"""The diffuse part of echoes over rough mirrors: a target lit by what they scatter.
+r"""The diffuse part of echoes over rough mirrors: targets illuminated by diffuse scattering.
 
-A rough mirror's patches p throw a wave :math:`W_p(a)` from an antenna a to a scattering centre
-:math:`q_0` of the target. What the target makes of it on the way to another place b is the sum
-over its facets from p to b, T(p, b), taken once for all antennas:
+A rough mirror's patches p scatter a wave :math:`W_p(a)` from an antenna a to a scattering centre
+:math:`q_0` of the target. The target's response from p to another place b is the sum over its
+facets, T(p, b), computed once for all antennas:
 
 .. math:: H(a) = \sum_p W_p(a)\, A(p), \quad A(p) = \frac{T(p, b)}{g(p, q_0)\, g(q_0, b)}
 
 with free-space links g and b the middle of the array, or its image over the other leg. With the
 coherent wave C(a) at the centre, diffuse-coherent echoes are H·C; diffuse-diffuse ones
-:math:`H H' / A_0`, as if the target's answer to two directions were the product of its answers to
-each with the coherent one. :math:`A_0` is the larger of the amplitude for the specular look and of
-its rms over the mirror: exact for a single scattering centre, bounded for any target.
+:math:`H H' / A_0`, as if the target's response for two diffuse directions were the product of its
+responses for each with the coherent one. :math:`A_0` is the larger of the amplitude in the specular
+direction and of its rms over the mirror: exact for a single scattering centre, bounded for any
+target.
 
-The centre is the facet with the shortest way between both looks: the specular point of a convex
+The centre is the facet with the shortest path between both ends: the specular point of a convex
 target.
 """
 
@@ -46,33 +47,34 @@ from simulator.specular.path_field import reflected_field
 from simulator.visibility.seen import Seen
 
 OFF_TARGET = 1e-4
-"""How far the scattering centre is before the facet it stands for. [m]"""
+"""Distance of the scattering centre in front of its facet. [m]"""
 
 FEWEST_PLACES = 0.5
-"""Places on the rough mirror over λR/D, between which a target of size D is looked up. [-]"""
+"""Spacing of the places on the rough mirror at which a target's response is computed, over λR/D,
+for a target of size D at the distance R. [-]"""
 
 MOST_PLACES = 2_500
-"""Places on the rough mirror that the target's answer is worked out for. [-]"""
+"""Most places on the rough mirror at which the target's response is computed. [-]"""
 
 ANSWER_NODES = (1, 2, 3, 4, 6, 8, 12, 16, 24)
-"""Frequencies at which a target's answer may be sampled. [-]"""
+"""Allowed numbers of frequencies at which a target's response is sampled. [-]"""
 
 ANSWER_ACCURACY = 0.1
-"""Error of the answer between these, relative, rms over the mirror: below that of taking a target
-for a scattering centre. [-]"""
+"""Relative interpolation error of the response, rms over the mirror: below that of representing a
+target by a scattering centre. [-]"""
 
 
 def diffuse_echo(
     scene: RadioScene, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the echoes of hidden and lit targets of which at least one way is diffuse.
+    """Sum the echoes of targets over two legs of which at least one is diffuse.
 
     Parameters
     ----------
     scene
         The frozen scene.
     send, receive
-        The array's antennas, pairwise; the same object if each hears its own echo.
+        The array's antennas, linked pairwise; the same object for monostatic echoes.
 
     Returns
     -------
@@ -116,7 +118,10 @@ class _Target:
         send: AntennaGroup,
         receive: AntennaGroup,
     ) -> Complex[np.ndarray, "links freqs"]:
-        """Sum diffuse-coherent echoes over two legs, both ways for equal ends, and diffuse ones."""
+        """Sum diffuse-coherent and diffuse-diffuse echoes over two legs.
+
+        Monostatic echoes over two different legs count twice: once with the legs exchanged.
+        """
         frequencies = self.scene.scenario.radio.frequencies
         echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
         images = one.leg.image(send), other.image(receive)
@@ -124,7 +129,7 @@ class _Target:
         centre = self._centre(ends[0], ends[1])
         if centre is None:
             return echo
-        # What arrives there is measured along the field of the antenna's image.
+        # The arriving field is taken along the field of the antenna's image.
         there, on_return = (
             AntennaGroup(positions=centre[None], pattern=_probe(image)) for image in images
         )
@@ -190,14 +195,14 @@ class _Target:
     def _centre(
         self, one: Float[np.ndarray, " 3"], other: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, " 3"] | None:
-        """Find where the way from one place to the other over the target is the shortest."""
+        """Return the point of the target with the shortest path between two places."""
         lit = self._lit(one, other)
         if lit.size == 0:
             return None
         centres = self.facets.centres[lit]
         ways = np.linalg.norm(centres - one, axis=-1) + np.linalg.norm(centres - other, axis=-1)
         best = lit[int(np.argmin(ways))]
-        # Off the mean surface, which rays meet.
+        # Off the mean surface, at which rays are tested.
         place, normal = self.facets.places[best], self.facets.mean_normals[best]
         side = np.sign(((one - place) * normal).sum())
         centre: np.ndarray = place + OFF_TARGET * side * normal
@@ -206,7 +211,7 @@ class _Target:
     def _coherent(
         self, leg: Leg, sight: AntennaGroup, centre: Float[np.ndarray, " 3"]
     ) -> Complex[np.ndarray, "links freqs"] | None:
-        """Work out the wave over a leg of mirrors at the centre; none where it does not lead."""
+        """Return the wave over a leg of mirrors at the centre; None without a path."""
         frequencies = self.scene.scenario.radio.frequencies
         image = leg.image(sight)
         towards = centre - image.positions
@@ -226,7 +231,7 @@ class _Target:
             return None
         chain = unfolded_chain(self.mirrors, leg.sequence, image.positions, centre[None])
         wave = direct_wave(lengths, frequencies, waves="spherical")
-        # The scattering centre stands for a target that answers the field of the antenna's image.
+        # The scattering centre receives the component along the field of the antenna's image.
         wave *= reflected_field(
             self.mirrors,
             chain,
@@ -244,14 +249,14 @@ class _Target:
         ends: Float[np.ndarray, "2 3"],
         fields: tuple[AntennaPattern, AntennaPattern],
     ) -> "_Answer":
-        """Work out the target's amplitudes from places on a rough mirror to one end."""
+        """Return the target's amplitudes from places on a rough mirror to one end."""
         frequencies = self.scene.scenario.radio.frequencies
         if self.scene.facets is None:
             raise ValueError("the scene has no facets; give a scene with a scattering object")
         spread = self.scene.facets.centres[some]
         size = float(np.linalg.norm(np.ptp(self.facets.centres, axis=0)))
         after = chain.after
-        # Where the rough mirror would be, seen from the target without the mirrors between.
+        # Image of the rough mirror in the mirrors between it and the target.
         seen_as = partial(_turned_back, after)
         apart = float(np.linalg.norm(seen_as(spread) - centre, axis=-1).min())
         width = np.sort(np.ptp(spread, axis=0))
@@ -302,7 +307,7 @@ class _Target:
 
 
 def _as_source(probe: Polarization) -> Polarization:
-    """Polarization of a source whose field a probe measures: its rays go on as the probe's end."""
+    """Return the polarization of a source that radiates the field which a probe receives."""
     return Polarization(axis=probe.axis, cross_polar=-probe.cross_polar)
 
 
@@ -311,7 +316,7 @@ def _isotropic(polarization: Polarization) -> AntennaPattern:
 
 
 def _probe(image: AntennaGroup) -> AntennaPattern:
-    """Make an isotropic antenna that receives the field of an antenna's image."""
+    """Return an isotropic antenna that receives the field of an antenna's image."""
     return _isotropic(_as_source(image.pattern.polarization))
 
 
@@ -330,7 +335,7 @@ def _everything(count: int, some: Int[np.ndarray, " some"]) -> Seen:
 def _nodes(
     amplitudes: Complex[np.ndarray, "places freqs"], frequencies: Float[np.ndarray, " freqs"]
 ) -> int:
-    """Count the frequencies that carry a target's answer over the band."""
+    """Count the frequencies that suffice to interpolate a target's response over the band."""
     exact = amplitudes[:: 1 + len(amplitudes) // 200]
     norm = float(np.linalg.norm(exact))
     for count in ANSWER_NODES[:-1]:
@@ -371,6 +376,6 @@ class _Answer:
         centres: Float[np.ndarray, "patches 3"],
         nodes: Float[np.ndarray, " nodes"],
     ) -> Complex[np.ndarray, "patches 1 nodes"]:
-        """Look up the places nearest to patches."""
+        """Return the amplitudes at the places nearest to patches."""
         nearest = self.tree.query(centres)[1]
         return _between(self.amplitudes[nearest], self.frequencies, nodes)[:, None, :]

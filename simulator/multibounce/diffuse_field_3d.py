@@ -1,9 +1,10 @@
 r"""One-way waves over legs of which one rough mirror scatters diffusely, the others specularly.
 
-The diffuse part is what the rough mirror's facets scatter, less its mean over realisations: that
-is physical optics of the mean plane times :math:`e^{-k^2\sigma^2(\cos\theta_i+\cos\theta_s)^2/2}`
-(Gaussian heights). The mean plane's facets are the rough ones projected onto it, so that both
-sums share footprint and visibility. Mirrors before and after it are images of either end.
+The diffuse part is the scattering of the rough mirror's facets less its mean over realisations,
+which is physical optics of the mean plane times
+:math:`e^{-k^2\sigma^2(\cos\theta_i+\cos\theta_s)^2/2}` (Gaussian heights). The mean plane's facets
+are the rough ones projected onto it, so that both sums have the same footprint and visibility.
+Mirrors before and after it are represented by images of either end.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,25 +31,25 @@ from simulator.visibility.seen import Seen
 from simulator.visibility.shaft_culling import TILE, Sightlines, object_shape, scenario_obstacles
 
 FACETS_AT_ONCE = 500_000
-"""Facets of the rough mirror that are summed, with their mean plane's, in one go: 110 MB. [-]"""
+"""Facets of the rough mirror summed, with their mean plane's, in one batch: 110 MB. [-]"""
 
 TRACED_SIDE = 0.02
-"""Side of the patches whose view over mirrors is that of one of their facets. [m]"""
+"""Side of the patches whose visibility over mirrors is traced at one of their facets. [m]"""
 
 SAMPLE_SIDE = 0.04
-"""Distance of places that tell whether anything at all is seen over several mirrors. [m]"""
+"""Spacing of sample points that test whether a leg over several mirrors exists at all. [m]"""
 
 LEAST_PEAK = 0.3
-"""Product of two field patterns, over that of their peaks, that some place on a rough mirror needs
-for a chain over further mirrors to count: -10 dB. [-]"""
+"""Product of two field patterns, relative to their peaks, that some point on a rough mirror must
+reach for a chain over further mirrors to be simulated: -10 dB. [-]"""
 
-TILE_RADIUS = TILE * 2**-0.5  # of the circle about a tile [m]
+TILE_RADIUS = TILE * 2**-0.5  # of a tile's circumscribed circle [m]
 
 MOST_SAMPLES = 50_000
-"""Facets among which those places are chosen. [-]"""
+"""Facets from which those sample points are taken. [-]"""
 
 LOSS_NODES = 2
-"""Frequencies beyond the first that a Gaussian loss needs over a band. [-]"""
+"""Additional frequencies for interpolating a Gaussian loss over a band. [-]"""
 
 
 def diffuse_wave(
@@ -61,7 +62,7 @@ def diffuse_wave(
     factor: Factor | None = None,
     factor_nodes: int = 1,
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum what a rough mirror scatters diffusely between an array and one place.
+    """Sum the diffuse scattering of a rough mirror between an array and one place.
 
     Parameters
     ----------
@@ -74,9 +75,9 @@ def diffuse_wave(
     other
         A single antenna: a user's, or an isotropic one at a target.
     beside
-        The object that the place is on, which does not hide it.
+        The object on which the place is; it does not hide the place.
     factor, factor_nodes
-        What else is multiplied, and at how many frequencies it has to be known.
+        Further factor of each patch's sum, and the frequencies at which it is sampled.
 
     Returns
     -------
@@ -132,7 +133,7 @@ def diffuse_wave(
 
 @dataclass(frozen=True, kw_only=True)
 class _MeanLoss:
-    """What roughness leaves of the mean plane's contributions, on the average."""
+    """Mean over realisations of a patch's sum, relative to the mean plane's."""
 
     normal: Float[np.ndarray, " 3"]
     rms: float
@@ -169,7 +170,7 @@ def _product(
 def facets_within_reach(
     scene: RadioScene, chain: DiffuseLeg, near: AntennaGroup, far: AntennaGroup
 ) -> Int[np.ndarray, " some"]:
-    """Find the rough mirror's facets that both patterns reach, tile by tile."""
+    """Return the rough mirror's facets within the product of both patterns, by tiles."""
     among, facets = scene.mirrors, scene.facets
     nothing = np.empty(0, dtype=np.int64)
     if among is None or facets is None or facets.material is None:
@@ -198,7 +199,7 @@ def facets_within_reach(
 class _Tiles:
     """Squares that cover a mirror."""
 
-    corner: Float[np.ndarray, " 3"]  # where they begin [m]
+    corner: Float[np.ndarray, " 3"]  # first corner of the grid [m]
     axes: Float[np.ndarray, "2 3"]  # along their sides
     counts: tuple[int, int]
 
@@ -215,13 +216,13 @@ class _Tiles:
 
     @property
     def middles(self) -> Float[np.ndarray, "tiles 3"]:
-        """Their middles [m]."""
+        """Centres of the tiles [m]."""
         grid = np.stack(np.meshgrid(*(np.arange(n) for n in self.counts), indexing="ij"), axis=-1)
         middles = self.corner + np.einsum("ija,ax->ijx", (grid + 0.5) * TILE, self.axes)
         return np.asarray(middles.reshape(-1, 3))
 
     def numbers(self, places: Float[np.ndarray, "places 3"]) -> Int[np.ndarray, " places"]:
-        """Return the tile of each place on the mirror."""
+        """Return the index of the tile of each place on the mirror."""
         along = np.einsum("px,ax->pa", places - self.corner, self.axes)
         cells = np.clip(np.floor(along / TILE).astype(np.int64), 0, np.array(self.counts) - 1)
         numbers: Int[np.ndarray, " places"] = cells[:, 0] * self.counts[1] + cells[:, 1]
@@ -231,7 +232,7 @@ class _Tiles:
 def _may_lead_there(
     mirrors: Mirrors, chain: DiffuseLeg, near: AntennaGroup, far: AntennaGroup
 ) -> bool:
-    """Tell whether any tile of the rough mirror can be within both beams, whoever sees it."""
+    """Return whether a tile of the rough mirror may be within both beams, without occlusion."""
     if not chain.before.bounces and not chain.after.bounces:
         return True  # each facet is looked at, anyway
     middles = _Tiles.of(mirrors, chain.rough).middles
@@ -246,7 +247,7 @@ def _leads_there(
     other: AntennaGroup,
     some: Int[np.ndarray, " some"],
 ) -> bool:
-    """Tell whether both ends see a place on the rough mirror within their beams, by samples."""
+    """Return whether both ends see a sample point of the rough mirror within their beams."""
     if scene.facets is None:
         return False
     if not chain.before.bounces and not chain.after.bounces:
@@ -259,7 +260,7 @@ def _leads_there(
         _traced(scene, chain, leg, sight, points).any(axis=0)
         for leg, sight in ((chain.after, other), (chain.before, corners))
     ]
-    # The patterns' product there, over that of their peaks.
+    # The patterns' product there, relative to their peaks.
     bright = chain.before.image(array).at_most(points, 0.0)
     bright = bright * chain.after.image(other).at_most(points, 0.0)
     return bool((seen[0] & seen[1] & (bright >= LEAST_PEAK)).any())
@@ -272,7 +273,7 @@ def _traced(
     sight: AntennaGroup,
     points: Float[np.ndarray, "points 3"],
 ) -> Bool[np.ndarray, "antennas points"]:
-    """Trace rays over a leg to places on a rough mirror."""
+    """Return which antennas see which points of a rough mirror over a leg, by rays."""
     if scene.mirrors is None:
         return np.zeros((len(sight.positions), len(points)), dtype=bool)
     mirrors = scene.mirrors.mirrors
@@ -292,7 +293,7 @@ def _traced(
 
 
 def _slabs(facets: Facets, some: Int[np.ndarray, " some"]) -> Iterator[Int[np.ndarray, " block"]]:
-    """Take facets together that lie side by side."""
+    """Yield blocks of neighbouring facets."""
     axis = int(np.argmax([np.ptp(facets.centres[some, k]) for k in range(3)]))
     order = np.argsort(facets.centres[some, axis], kind="stable")
     yield from np.array_split(some[order], 1 + some.size // FACETS_AT_ONCE)
@@ -341,7 +342,7 @@ def _look_over_mirrors(
     sight: AntennaGroup,
     some: Int[np.ndarray, " some"],
 ) -> Seen:
-    """Trace one facet of each small patch over a leg, from every antenna."""
+    """Return visibility over a leg, traced at one facet of each small patch."""
     if scene.mirrors is None or scene.facets is None:
         raise ValueError("the scene has no facets; give a scene with a scattering object")
     facets = scene.facets.part(some)
@@ -360,7 +361,7 @@ def _look_over_mirrors(
 
 
 def _both(array: Seen, other: Seen) -> Seen:
-    """Combine what all antennas of the array see with what the single other one sees."""
+    """Combine the visibility from the array's antennas with that from the single other one."""
     kept = other.always[array.sometimes]
     return Seen(
         always=array.always & other.always,
@@ -370,7 +371,7 @@ def _both(array: Seen, other: Seen) -> Seen:
 
 
 def _some_of(seen: Seen, count: int, some: Int[np.ndarray, " some"]) -> Seen:
-    """Tell what is seen of some facets from what is seen of all."""
+    """Select the visibility of some facets from that of all."""
     row: Int[np.ndarray, " count"] = np.full(count, -1)
     row[seen.sometimes] = np.arange(len(seen.sometimes))
     rows = row[some]

@@ -1,8 +1,8 @@
 r"""Interpolation over frequency: sums of waves with similar delays, from a few Chebyshev nodes.
 
-Once a common delay is taken out of contributions whose delays lie within an interval, they vary
-slowly over the band and are interpolated from a few Chebyshev nodes. Where that would need as many
-nodes as there are frequencies, every frequency is computed.
+Contributions whose delays lie within an interval vary slowly over the band once a common delay is
+removed, and are interpolated from a few Chebyshev nodes. If that needs as many nodes as there are
+frequencies, every frequency is computed.
 """
 
 import threading
@@ -20,8 +20,8 @@ from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
 
 CHAIN_ACCURACY = 1e-4
-"""Error of interpolation over the band, and of the sum, over the strength of the contributions.
-Chains are summed in single precision and by physical optics, which is good to some 1e-2. [-]"""
+"""Error of interpolation over the band, and of the sum, relative to the contributions' strength.
+Chains are summed in single precision, and the error of physical optics is some 1e-2. [-]"""
 
 MOST_NODES = 4096
 """Most nodes of a chain; one that needs more is computed at every frequency. [-]"""
@@ -32,13 +32,13 @@ INCIDENCES = (STEEP, 0.3, 0.5, 0.7, 0.85, 1.0)
 
 @dataclass(frozen=True)
 class EveryFrequency:
-    """Sums contributions whose amplitudes are known at every frequency."""
+    """Sum of contributions whose amplitudes are computed at every frequency."""
 
     frequencies: Float[np.ndarray, " freqs"]
 
     @property
     def nodes(self) -> Float[np.ndarray, " nodes"]:
-        """Where the amplitudes are known: everywhere."""
+        """Frequencies at which amplitudes are computed: all."""
         return self.frequencies
 
     def __call__(
@@ -54,10 +54,10 @@ class EveryFrequency:
 
 @dataclass(frozen=True)
 class FewFrequencies:
-    """Sums contributions whose amplitudes are known at Chebyshev nodes; safe in several threads.
+    """Sum of contributions whose amplitudes are computed at Chebyshev nodes; thread-safe.
 
-    The sum itself, less its mean delay, is worked out at few frequencies too, by a non-uniform
-    transform from delays to nodes, and interpolated.
+    The sum itself, less its mean delay, is computed at few frequencies too, by a non-uniform
+    Fourier transform from delays to nodes, and interpolated.
     """
 
     frequencies: Float[np.ndarray, " freqs"]
@@ -97,7 +97,7 @@ class FewFrequencies:
         return np.asarray(spectrum * np.exp(-2j * np.pi * (turns - np.rint(turns))))
 
     def _basis(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points at which the sum is worked out; from the nodes to them; from them onward."""
+        """Points at which the sum is computed, and matrices from nodes to points to the band."""
         with self._lock:
             if count not in self._bases:
                 start, stop = float(self.frequencies[0]), float(self.frequencies[-1])
@@ -117,25 +117,25 @@ def few_frequencies(
     pattern_nodes: int,
     interpolate: bool,
 ) -> FewFrequencies | EveryFrequency:
-    """Choose at how few frequencies waves have to be known to be summed over the band.
+    """Choose the frequencies at which waves are computed to be summed over the band.
 
     Parameters
     ----------
     frequencies
         Uniform grid. [Hz]
     spread
-        By how much the lengths of paths differ that arrive at one facet. [m]
+        Largest difference of path lengths at one facet. [m]
     materials
-        What reflects them.
+        Of the reflecting surfaces.
     pattern_nodes
-        Frequencies that the patterns of the two antennas have to be known at, in all.
+        Frequencies at which the patterns of the two antennas are sampled, in all.
     interpolate
-        Whether few frequencies are wanted.
+        Whether interpolation is allowed.
 
     Returns
     -------
-    The sum over the band of contributions known at its ``nodes``: all frequencies, if it
-    takes no fewer.
+    The sum over the band of contributions given at its ``nodes``; these are all frequencies if
+    interpolation needs no fewer.
     """
     start, stop = float(frequencies[0]), float(frequencies[-1])
     count = nodes_for_chain(spread / speed_of_light, materials, start, stop) + pattern_nodes - 2
@@ -147,13 +147,13 @@ def few_frequencies(
 def nodes_for_chain(
     delay_spread: float, materials: Sequence[Material], start: float, stop: float
 ) -> int:
-    r"""Count the Chebyshev nodes that interpolate what a chain of surfaces returns over a band.
+    r"""Count the Chebyshev nodes that interpolate the response of a chain of surfaces over a band.
 
-    That is a delay, within ± half the spread, times the coefficients of all surfaces. The error
-    of interpolation at M nodes is at most twice the sum of the moduli of the Chebyshev
+    The response is a delay, within ± half the spread, times the coefficients of all surfaces. The
+    error of interpolation at M nodes is at most twice the sum of the moduli of the Chebyshev
     coefficients from the M-th on (L. N. Trefethen, *Approximation Theory and Approximation
-    Practice*, theorem 4.2); they are worked out for the longest and the shortest delay, at
-    several angles of incidence.
+    Practice*, theorem 4.2); they are computed for the longest and the shortest delay, at several
+    angles of incidence.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def nodes_for_chain(
 
     Returns
     -------
-    The fewest whose error is below :data:`CHAIN_ACCURACY`.
+    The smallest number whose error is below :data:`CHAIN_ACCURACY`.
     """
     half_phase = np.pi * delay_spread * (stop - start) / 2
     size = 64
@@ -179,7 +179,7 @@ def nodes_for_chain(
         if not isinstance(material, Conductor):
             product *= reflection(material, points, np.array(INCIDENCES)).te
     both = np.exp(1j * half_phase * np.array([1.0, -1.0])[:, None, None] * across) * product
-    # dct() takes the nodes from the end of the interval on: from cos(π/2K) down.
+    # dct() expects nodes in descending order, from cos(π/2K).
     coefficients = np.abs(dct(both.real, axis=-1) + 1j * dct(both.imag, axis=-1)) / size
     left_out = 2 * np.cumsum(coefficients[..., ::-1], axis=-1)[..., ::-1].max(axis=(0, 1))
     short = np.flatnonzero(left_out > CHAIN_ACCURACY)

@@ -1,20 +1,20 @@
-r"""The field that antennas send to the facets of one surface over the facets of another.
+r"""Iterative physical optics: fields of antennas at one surface's facets, via another's.
 
 Line facets (2-D). With the free-space link of a line source, :math:`G = g_0 e^{-jkr}/\sqrt r`,
 :math:`g_0 = e^{-j\pi/4}/\sqrt{8\pi k}`, a field is written :math:`h = g_0 \eta`. A wall's facets
-w take a wave onward to the facets q of a target by physical optics, in the reciprocal form,
+w scatter a wave to the facets q of a target by physical optics, in the reciprocal form,
 
 .. math:: \eta_q = \sqrt{\tfrac{k}{8\pi}}\, e^{j\pi/4} \sum_w \Gamma_w
           (\cos\theta_{in} + \cos\theta_{out})\, \eta_w \frac{e^{-jk r_{wq}}}{\sqrt{r_{wq}}}\, ds_w
 
-so that a long flat mirror returns :math:`\Gamma/\sqrt L` over a path of total length L. Since
-each contribution arrives from its own direction, its derivative along the normal, over jk, is
-the contribution times the cosine of its angle of incidence: the *slope* of the wave. Both are
-what the next surface needs, so that chains of surfaces are made by repetition.
+so that a long flat mirror gives :math:`\Gamma/\sqrt L` over a path of total length L. Each
+contribution has one direction of arrival, so its derivative along the normal, over jk, is the
+contribution times the cosine of its angle of incidence: the *slope* of the wave. The next surface
+needs field and slope, so that chains of surfaces are computed by repetition.
 
-The sum over wall facets is a product of matrices at each frequency, of far smaller ones between
-blocks of facets that are far apart (:mod:`simulator.numerics.butterfly`). Once the delay of a path
-in the middle of the contributions' is taken out, the field varies slowly with frequency.
+The sum over wall facets is a matrix product at each frequency, with much smaller matrices between
+blocks of facets that are far apart (:mod:`simulator.numerics.butterfly`). Without the delay of a
+path of mean length, the field varies slowly with frequency.
 """
 
 import math
@@ -37,23 +37,23 @@ from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_plann
 from simulator.visibility.mutual_visibility import Sight
 
 COLUMNS_AT_ONCE = 1024
-"""Facets of a target whose single links with a block of a wall are prepared together."""
+"""Facets of a target whose single links with a block of a wall are prepared in one batch. [-]"""
 
 LINKS_HELD = 2**24
 """Single links whose geometry is held for all frequencies: 340 MB. [-]"""
 
 FACTOR_BYTES = 2**30
-"""What waves at one frequency may take in all threads. [byte]"""
+"""Most memory of waves at one frequency in all threads. [byte]"""
 
 GROUP_WIDTH = 1e-3
-"""Wall facets are taken together over this length to bound the lengths of paths. [m]"""
+"""Length of the groups of wall facets by which path lengths are bounded. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wave:
-    """Field of ports at the facets of a face; zero where nothing arrives.
+    """Field of ports at the facets of a face, 0 if not illuminated, less a delay.
 
-    The delay of :attr:`middle` is taken out of it.
+    The delay is that of the length :attr:`middle`.
     """
 
     strength: Complex64[np.ndarray, "#nodes ports facets"]  # [m^-1/2]
@@ -62,11 +62,11 @@ class Wave:
 
     @property
     def middle(self) -> Float[np.ndarray, "ports facets"]:
-        """Length whose delay is taken out. [m]."""
+        """Length whose delay is removed. [m]."""
         return self.bounds.middle
 
     def part(self, facets: slice | Int[np.ndarray, " chosen"], port: int) -> "Wave":
-        """Choose one port and some facets; a single port's wave serves all ports."""
+        """Select one port and some facets; a single port's wave serves all ports."""
         row = slice(port, port + 1) if self.strength.shape[1] > 1 else slice(None)
         return Wave(
             strength=self.strength[:, row, facets],
@@ -77,11 +77,11 @@ class Wave:
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Between which lengths lie the paths from ports to the facets of a face."""
+    """Shortest and longest paths from ports to the facets of a face."""
 
-    shortest: Float[np.ndarray, "ports facets"]  # 0 where nothing arrives [m]
+    shortest: Float[np.ndarray, "ports facets"]  # 0 without any path [m]
     longest: Float[np.ndarray, "ports facets"]  # [m]
-    origins: Float[np.ndarray, "ports facets 2"]  # where the shortest path comes from [m]
+    origins: Float[np.ndarray, "ports facets 2"]  # origin of the shortest path's last leg [m]
 
     @property
     def middle(self) -> Float[np.ndarray, "ports facets"]:
@@ -97,7 +97,7 @@ class Bounds:
     def part(
         self, facets: slice | Int[np.ndarray, " chosen"], ports: slice = slice(None)
     ) -> "Bounds":
-        """Choose some of the facets, and of the ports."""
+        """Select some of the facets, and of the ports."""
         return Bounds(
             shortest=self.shortest[ports, facets],
             longest=self.longest[ports, facets],
@@ -106,7 +106,7 @@ class Bounds:
 
 
 def quadrature(face: Face, count: int) -> Face:
-    """Replace each facet by the points of its Gauss rule: the phase over it is not constant."""
+    """Replace each facet by the points of its Gauss rule, if the phase over it varies."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     points = face.centres[:, None] + nodes[:, None] / 2 * face.edges[:, None]
     repeated = face.part(np.repeat(np.arange(face.count), count))
@@ -132,11 +132,11 @@ def direct(face: Face, ports: Ports, nodes: Float[np.ndarray, " nodes"]) -> Wave
     Parameters
     ----------
     face
-        Where the wave arrives.
+        The receiving face.
     ports
         Antennas, with the visibility of the whole set of facets.
     nodes
-        Frequencies that a pattern which varies over the band is sampled at. [Hz]
+        Frequencies at which a pattern that varies over the band is sampled. [Hz]
     """
     towards = ports.positions[:, None, :2] - face.centres
     distance = np.sqrt(np.einsum("pfx,pfx->pf", towards, towards))
@@ -170,7 +170,7 @@ def onward_bounds(
     wall, target
         The two faces.
     seen
-        Which facets of the wall and of the target see each other.
+        Visibility between the facets of the wall and of the target.
     """
     firsts = _groups(wall)
     members = np.diff(np.append(firsts, wall.count))
@@ -212,12 +212,12 @@ def onward(
     bounds: Bounds,
     nodes: Float[np.ndarray, " nodes"],
 ) -> Wave:
-    """Take a wave from a wall to a target by physical optics on the wall's facets.
+    """Propagate a wave from a wall to a target by physical optics on the wall's facets.
 
     Parameters
     ----------
     wave
-        What arrives at the wall: at these nodes, or the same at all frequencies.
+        The wave at the wall: at these nodes, or the same at all frequencies.
     wall, target, sight
         The two faces, which of their facets see each other, and the slabs between these.
     bounds
@@ -230,12 +230,12 @@ def onward(
     strength, slope = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
     if not seen.any():
         return Wave(strength=np.zeros_like(strength), slope=np.zeros_like(slope), bounds=bounds)
-    # The mirror that would lead from the ports to the middle of what is seen of the target.
+    # Angle of the mirror that connects the ports with the middle of the target's visible part.
     towards = target.centres[seen.any(axis=0)].mean(axis=0)
     table = reflection_table(wall.material, nodes, polarization=wall.polarization)
     incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
     plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
-    if sight.crossings:  # each two facets have their own angle at the slabs
+    if sight.crossings:  # each pair of facets has its own angle at the slabs
         plan = replace(plan, pairs=(), left=seen, by_sender={}, by_receiver={})
     slabs = [InsertionTable.of(one, nodes, wall.polarization) for one in sight.crossings]
     single = _SingleLinks.left_by(plan, wall, target, slabs)
@@ -278,7 +278,7 @@ def onward(
 
     needed = 64 * ports * (wall.count + columns)
     workers = max(1, min(thread_count(), FACTOR_BYTES // needed))
-    # BLAS threads of their own would spin against these: up to 20 times slower.
+    # BLAS threads in addition would compete with these: up to 20 times slower.
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
         list(pool.map(at_node, range(nodes.size)))
     return Wave(strength=strength, slope=slope, bounds=bounds)
@@ -295,13 +295,13 @@ class _SingleLinks:
     leaves: Float32[np.ndarray, "wall target"]  # cosine to the wall's normal
     aside: Float32[np.ndarray, "wall target"] | None  # along it, if it is rough
     arrives: Float32[np.ndarray, "wall target"]  # cosine to the target's
-    slabs: Sequence[tuple[InsertionTable, Angles]]  # on the way, and at which angles
+    slabs: Sequence[tuple[InsertionTable, Angles]]  # crossed, and the angles there
 
     @classmethod
     def left_by(
         cls, plan: LinkPlan, wall: Face, target: Face, slabs: Sequence[InsertionTable]
     ) -> "Iterable[_SingleLinks]":
-        """Prepare the links that the blocks leave, some at a time; once, unless too many."""
+        """Prepare the links left by the blocks, in batches; cached, unless too many."""
         if int(plan.left.sum()) > LINKS_HELD:
             return _Anew(lambda: cls._prepared(plan, wall, target, slabs))
         return list(cls._prepared(plan, wall, target, slabs))
@@ -316,7 +316,7 @@ class _SingleLinks:
             for first in range(0, columns.size, COLUMNS_AT_ONCE):
                 some = columns[first : first + COLUMNS_AT_ONCE]
                 between = target.centres[some] - wall.centres[rows, None]
-                # Facets that touch have no distance, and no far field either.
+                # For adjacent facets the distance is about 0, and the far field does not apply.
                 distance = np.maximum(np.linalg.norm(between, axis=-1), wall.sizes[rows, None] / 2)
                 direction = between / distance[..., None]
                 links = plan.left[np.ix_(rows, some)] / np.sqrt(distance)
@@ -362,7 +362,7 @@ class _SingleLinks:
 
 @dataclass(frozen=True)
 class _Anew:
-    """Makes its items anew each time it is run through."""
+    """Iterable that makes its items anew in each iteration."""
 
     make: "Callable[[], Iterator[_SingleLinks]]"
 
@@ -371,7 +371,7 @@ class _Anew:
 
 
 def _groups(wall: Face) -> np.ndarray:
-    """First facets of runs of neighbours that are about :data:`GROUP_WIDTH` long."""
+    """Return the first facets of groups of neighbours about :data:`GROUP_WIDTH` long."""
     steps = np.linalg.norm(np.diff(wall.centres, axis=0), axis=-1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     return np.unique(along // GROUP_WIDTH, return_index=True)[1]

@@ -1,7 +1,7 @@
 r"""Chains of several surfaces in two dimensions: ghosts in the echo, pilots over two walls.
 
-Each chain is cut at one of its surfaces, the target. With the one-way waves :math:`\eta` and
-their slopes :math:`\eta'` that both ends send there
+Each chain is divided at one of its surfaces, the target. With the one-way waves :math:`\eta` of
+both ends there and their slopes :math:`\eta'`
 (:mod:`simulator.multibounce.iterative_physical_optics`), the target links them by reciprocity,
 
 .. math:: S = \frac{1}{8\pi} \sum_q \Gamma_q\, (\eta_t \eta'_r + \eta'_t \eta_r)\, ds_q
@@ -11,13 +11,12 @@ which for a conductor seen by one and the same antenna is
 :math:`\sqrt{\lambda/L}\, e^{j\pi/4}` with the length L of the whole path, so that flat mirrors
 give :math:`\lambda/4\pi L`.
 
-What is in it: chains of two and more surfaces, up to the ``max_bounces`` asked for, each chain
-once for each order in which its surfaces are met. An echo is cut in the middle (out and back over
-any walls, or directly one of the ways), an uplink at its last surface. A single surface is left to
-plain physical optics. Which chains there are, and how much work:
-:mod:`simulator.multibounce.chain_count`.
-What is neglected: several scatterings within one object, diffraction around an object beyond what
-its lit facets radiate, and the near field of facets closer to each other than a wavelength.
+Included are chains of two and more surfaces, up to ``max_bounces``, once for each order of their
+surfaces. An echo is divided in the middle (each leg over any walls or direct), an uplink at its
+last surface. A single surface is left to plain physical optics. Chains are enumerated and their
+work is counted in :mod:`simulator.multibounce.chain_count`.
+Left out are multiple scattering within one object, diffraction around an object beyond the
+radiation of its illuminated facets, and the near field of facets less than a wavelength apart.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -48,18 +47,18 @@ from simulator.multibounce.passage import Link, Passage, passages_over
 from simulator.multibounce.rough_faces import rough_factor, unit
 
 WAVE_BYTES = 2**29
-"""What the waves may take that are held at one time, at a block of a target's facets and, apart
-from these, at the walls before it: 512 MiB. [byte]"""
+"""Most memory of the waves at a block of a target's facets, and of those at the walls before it:
+512 MiB each. [byte]"""
 
 FACETS_AT_ONCE = 1500
 """Most facets of a target in one block. [-]"""
 
 SeveralProgress = Callable[[int, int], None]
-"""Told how much is done, and of how much. [-]"""
+"""Called with the work done and the work in all. [-]"""
 
 
 def untold(done: int, total: int) -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 def ghost_echo(
@@ -82,17 +81,17 @@ def ghost_echo(
     sees
         Their mutual visibility.
     array
-        The antennas: each transmits, and receives what returns.
+        The antennas: each transmits, and receives its own echo.
     frequencies
         Uniform grid. [Hz]
     waves
         Spherical (S-parameters) or cylindrical (fields of a unit line source).
     max_bounces
-        Surfaces in a chain; below two there is nothing to sum.
+        Most surfaces in a chain; below two the sum is empty.
     interpolate
-        Work the waves out at few frequencies and interpolate; otherwise at every frequency.
+        Whether waves are computed at few frequencies and interpolated, not at every one.
     progress
-        Told how many are done of the facets that chains are cut at, counted for each port.
+        Called with the number of target facets done, counted for each port.
 
     Returns
     -------
@@ -149,11 +148,11 @@ def _echo_links(
     max_bounces: int,
     directly: Sequence[Ports],
 ) -> list[Link]:
-    """Pair the ways to a target: each chain of surfaces once, with the way it is run through back.
+    """Pair the passages to a target: each chain of surfaces once, together with its reverse.
 
-    A chain of an odd number of surfaces is cut at its middle one, with as many walls on either
-    side. One of an even number is not its own reverse; of the two, the one is cut whose two middle
-    surfaces are met in their order, at the later of them.
+    A chain of an odd number of surfaces is divided at its middle one, with as many walls on either
+    side. One of an even number differs from its reverse; of the two, that one is divided whose two
+    middle surfaces are in ascending order, at the later of them.
     """
     links = []
     for (i, (out, to)), (j, (back, fro)) in combinations_with_replacement(enumerate(passages), 2):
@@ -185,7 +184,7 @@ def uplink_over_surfaces(
     interpolate: bool = True,
     progress: SeveralProgress = untold,
 ) -> Complex[np.ndarray, "ports freqs"]:
-    """Sum what reaches each element from one user over two and more surfaces.
+    """Sum the pilot of one user at each element over two and more surfaces.
 
     Parameters
     ----------
@@ -198,7 +197,7 @@ def uplink_over_surfaces(
     frequencies, waves, max_bounces, interpolate
         As for :func:`ghost_echo`.
     progress
-        Told how many chains are done.
+        Called with the number of chains done.
 
     Returns
     -------
@@ -230,14 +229,14 @@ def _echo_of(
     waves: Waves,
     interpolate: bool,
 ) -> Iterator[tuple[slice, int, Complex[np.ndarray, "ports freqs"]]]:
-    """Sum the chains that are cut at one target, for some ports and some of its facets at a time.
+    """Yield partial sums of the chains divided at one target, for some ports and facets each.
 
-    Yields which ports, how many facets, and their sum.
+    Each item holds the ports, the number of facets, and their sum.
     """
     total = _few_frequencies(target, links, frequencies, interpolate)
     passages = _passages_of(links)
     ports_of = {id(link.back): link.back for link in links if isinstance(link.back, Ports)}
-    # At walls that others precede, waves vary with frequency; those at the first are small.
+    # Waves at walls after the first vary with frequency; those at the first take little memory.
     held = sum(one.walls[-1].count for one in passages.values() if len(one.walls) > 1)
     ports, at_once = len(array.positions), max(1, WAVE_BYTES // (16 * total.nodes.size))
     for row in range(0, ports, max(1, at_once // max(1, held))):
@@ -268,7 +267,7 @@ def _few_frequencies(
     frequencies: Float[np.ndarray, " freqs"],
     interpolate: bool,
 ) -> FewFrequencies | EveryFrequency:
-    """Choose the frequencies that do for all chains which are cut at one target."""
+    """Choose the frequencies that suffice for all chains divided at one target."""
     extra = max(link.nodes for link in links)
     spreads: dict[tuple[int, ...], float] = {}
     materials: dict[tuple[int, ...], list[Material]] = {}
@@ -293,7 +292,7 @@ def _pilot_over(
     waves: Waves,
     interpolate: bool,
 ) -> Complex[np.ndarray, "ports freqs"]:
-    """Take the user's wave over all surfaces of a chain to the array."""
+    """Propagate the user's wave over all surfaces of a chain to the array."""
     pilot = np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     target = chain[-1]
     target = target.part(np.flatnonzero(array.visible[:, target.source].any(axis=0)))
@@ -316,7 +315,7 @@ def _linked(
     total: FewFrequencies | EveryFrequency,
     waves: Waves,
 ) -> Complex[np.ndarray, "ports freqs"]:
-    """Link pairs of waves at a target, by reciprocity; the factors say how often each counts."""
+    """Link pairs of waves at a target by reciprocity, each with the weight of its chain."""
     nodes, frequencies = total.nodes, total.frequencies
     table = reflection_table(target.material, nodes, polarization=target.polarization)
 

@@ -1,18 +1,18 @@
-r"""The echo in space over several surfaces: targets seen over mirrors, and chains of mirrors alone.
+r"""The echo over several surfaces in 3-D: targets seen over mirrors, and chains of mirrors alone.
 
-A target (a body that is no plate, of at most
-:data:`simulator.scene.scene_mirrors.LARGEST_TARGET`) is lit over legs: directly, or over
-mirrors. Its facets scatter what comes over one leg into another: wall-target, target-wall,
-wall-target-wall, with the mirrors' reflection at each frequency and the coherent loss of their
-roughness. The direct way out and back is left to plain physical optics. Of a chain between two
-targets the later one is cut into facets, and the other one is a mirror. What no target is part of
-(three walls of a corner) is an image of the antenna itself.
+A target (a body other than a plate, of at most
+:data:`simulator.scene.scene_mirrors.LARGEST_TARGET`) is illuminated over legs: directly, or over
+mirrors. Its facets scatter from one leg into another: wall-target, target-wall, wall-target-wall,
+with the mirrors' reflection at each frequency and the coherent loss of their roughness. The direct
+echo is left to plain physical optics. In a chain between two targets, the later one is of facets
+and the earlier one is a mirror. Chains without a target (three walls of a corner) are images of the
+antenna itself.
 
 The diffuse part is that of :mod:`simulator.multibounce.diffuse_echo_3d`.
 
-What is neglected: which part of a target a leg lights is found patch by patch, from one facet of
-each; of what comes over mirrors to the target, the part across the field of the antenna's image;
-chains of two targets of which the earlier is curved.
+Approximations: visibility of a target over a leg is traced at one facet of each patch; the field
+over mirrors has only the component along the field of the antenna's image; chains of two targets
+of which the earlier is curved are left out.
 """
 
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ from simulator.specular.path_field import Through, reflected_field
 from simulator.visibility.seen import Seen
 
 NUDGE = np.array([2e-5, 1.4e-5, 0.9e-5])
-"""How far a receiver is moved either way to see whether its path meets an edge: farther than
-rays are lifted off their mirrors, and along no edge of a usual room. [m]"""
+"""Displacement of a receiver, either way, to test whether its path meets an edge: farther than
+rays are moved off their mirrors, and along no edge of a usual room. [m]"""
 
 
 def echo_over_mirrors(
@@ -67,7 +67,7 @@ def coherent_echo(
     scene
         The frozen scene.
     send, receive
-        The array's antennas, pairwise; the same object if each hears its own echo.
+        The array's antennas, linked pairwise; the same object for monostatic echoes.
 
     Returns
     -------
@@ -89,11 +89,11 @@ def coherent_echo(
         bounces = np.array([leg.bounces for leg in legs])
         together = bounces[:, None] + bounces
         wanted = (together >= 1) & (together <= most)
-        if send is receive:  # the same way the other way round
+        if send is receive:  # each path is also traversed in reverse
             wanted = np.triu(wanted)
         for out, back in np.argwhere(wanted).tolist():
             pair = legs[out], legs[back]
-            # Met at the other end of the chain, too: cut there, if that target is the later one.
+            # The chain ends at another target, too: it is evaluated at the later one.
             ends = [leg.sequence[0] for leg in pair if leg.sequence]
             other = among.owners[ends[0]]
             if len(ends) == 1 and own and other in names and order[other] > order[name]:
@@ -104,7 +104,7 @@ def coherent_echo(
 
 
 class _Sight(NamedTuple):
-    """Patches that antennas see over a leg through the same slabs."""
+    """Visibility of patches over a leg through one set of slabs."""
 
     through: Through
     seen: Bool[np.ndarray, "links patches"]
@@ -119,7 +119,7 @@ class _Target:
     receive: AntennaGroup
 
     def echo(self, out: Leg, back: Leg) -> Complex[np.ndarray, "links freqs"]:
-        """Sum what the target scatters from one leg into another."""
+        """Sum the target's scattering from one leg into another."""
         scene, facets = self.scene, self.facets
         frequencies = scene.scenario.radio.frequencies
         links_count = len(self.receive.positions)
@@ -165,7 +165,7 @@ class _Target:
         return spectrum
 
     def _nodes(self, out: Leg, back: Leg, through: tuple[Through, Through]) -> int:
-        """Count the frequencies at which mirrors and slabs have to be known."""
+        """Count the frequencies at which the factor of mirrors and slabs is sampled."""
         frequencies = self.scene.scenario.radio.frequencies
         start, stop = float(frequencies[0]), float(frequencies[-1])
         nodes = 3  # the loss of roughness
@@ -182,7 +182,7 @@ class _Target:
         order: Int[np.ndarray, " facets"],
         first: Int[np.ndarray, " patches_and_one"],
     ) -> list[_Sight]:
-        """Trace one facet of each patch over a leg, from every antenna: what faces them most."""
+        """Trace one facet of each patch over a leg: the one that faces the antennas most."""
         facets = self.facets.part(order)
         towards = leg.image(sight).centre - facets.centres
         facing = np.abs(np.einsum("fx,fx->f", towards, facets.mean_normals))
@@ -221,7 +221,7 @@ def _look_up(
     patch_of: Int[np.ndarray, " facets"],
     some: Int[np.ndarray, " some"],
 ) -> Seen:
-    """Tell what is seen of some facets from what is seen of their patches."""
+    """Return the visibility of some facets: that of their patches."""
     always, ever = np.asarray(seen.all(axis=0)), np.asarray(seen.any(axis=0))
     patches = patch_of[some]
     mixed = np.flatnonzero((ever & ~always)[patches])
@@ -235,7 +235,7 @@ def _look_up(
 def _over_mirrors_alone(
     scene: RadioScene, among: SceneMirrors, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the chains that return to the array over two and more mirrors, and no target."""
+    """Sum the chains that return to the array over two and more mirrors, without a target."""
     frequencies = scene.scenario.radio.frequencies
     echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
     mirrors = among.mirrors
@@ -284,11 +284,11 @@ def _shares(
     sources: Float[np.ndarray, "links 3"],
     receivers: Float[np.ndarray, "links 3"],
 ) -> tuple[Float[np.ndarray, " links"], Int[np.ndarray, "links legs"]]:
-    """Tell which paths a leg has, 0 or 1; where it just has one, one half.
+    """Return the weights of a leg's paths, 0 or 1, and 1/2 on an edge; and the slabs crossed.
 
-    Between two walls at right angles the way back to the antenna meets their very edge. Both
-    orders of the walls then count half, as physical optics has it: half of the Fresnel zone lies
-    on either wall. With it, the sets of slabs on each part of the way.
+    Between two walls at right angles, the path back to the antenna meets their common edge. Both
+    orders of the walls then have the weight 1/2, as in physical optics: half of the Fresnel zone is
+    on either wall. The second result is the set of slabs on each part of the path.
     """
     shares = np.zeros(len(sources))
     crossed = np.zeros((len(sources), leg.bounces + 1), dtype=np.int64)

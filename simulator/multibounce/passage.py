@@ -1,8 +1,8 @@
-"""A wave's way from its ports over several walls to a target, and which facets of each matter.
+"""A wave's passage from its ports over several walls to a target.
 
-A :class:`Passage` is prepared once for all frequencies: the walls' facets that see what
-follows, with the points that the phase over them needs, and bounds of all lengths. A
-:class:`Link` joins two of them at a target (:mod:`simulator.multibounce.multibounce_2d`).
+A :class:`Passage` is prepared once for all frequencies: the walls' facets that see the next face,
+with the quadrature points for the phase over them, and bounds of all lengths. A :class:`Link`
+joins two of them at a target (:mod:`simulator.multibounce.multibounce_2d`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,18 +28,19 @@ from simulator.multibounce.iterative_physical_optics import (
 from simulator.visibility.mutual_visibility import Sight
 
 GAUSS_LIMITS = (0.24, 1.28, 2.6)
-"""Half the phase over a facet up to which one, two and three Gauss points are within 1 %. [rad]"""
+"""Half the phase difference over a facet up to which the error of one, two and three Gauss points
+is below 1 %. [rad]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Passage:
-    """A wave from the ports over walls to a target, not yet worked out."""
+    """A wave from the ports over walls to a target, not yet evaluated."""
 
     ports: Ports
-    walls: tuple[Face, ...]  # in the order in which they are met, with the points of their phase
-    sights: tuple[Sight, ...]  # of each wall and what follows it
-    bounds: tuple[Bounds, ...]  # at what follows each wall; the last are those at the target
-    through: int = 0  # frequencies that the slabs between walls ask for
+    walls: tuple[Face, ...]  # in order, with quadrature points
+    sights: tuple[Sight, ...]  # between each wall and the next face
+    bounds: tuple[Bounds, ...]  # at the face after each wall; the last at the target
+    through: int = 0  # frequencies needed for the slabs between walls
 
     @property
     def spread(self) -> float:
@@ -48,11 +49,11 @@ class Passage:
 
     @property
     def nodes(self) -> int:
-        """Frequencies that the ports' pattern and slabs on the way ask for, beyond the walls."""
+        """Frequencies needed for the ports' patterns and slabs, beyond those for the walls."""
         return self.ports.nodes + self.through
 
     def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Passage":
-        """Choose some of the target's facets."""
+        """Select some of the target's facets."""
         return replace(
             self,
             sights=(
@@ -63,7 +64,7 @@ class Passage:
         )
 
     def of_ports(self, some: slice) -> "Passage":
-        """Choose some of the ports."""
+        """Select some of the ports."""
         return replace(
             self,
             ports=self.ports.part(some),
@@ -71,24 +72,24 @@ class Passage:
         )
 
     def at_last_wall(self, nodes: Float[np.ndarray, " nodes"]) -> Wave:
-        """Work out the wave that the last wall sends on."""
+        """Return the wave at the last wall."""
         wave = direct(self.walls[0], self.ports, nodes)
         for place, (wall, onto) in enumerate(pairwise(self.walls)):
             wave = onward(wave, wall, onto, self.sights[place], self.bounds[place], nodes)
         return wave
 
     def arriving(self, sent: Wave, target: Face, nodes: Float[np.ndarray, " nodes"]) -> Wave:
-        """Work out what arrives of the wave at the last wall."""
+        """Return the wave at the target, from that at the last wall."""
         return onward(sent, self.walls[-1], target, self.sights[-1], self.bounds[-1], nodes)
 
 
 @dataclass(frozen=True)
 class Link:
-    """Two waves that a target links: out and back, and how often their chain counts."""
+    """Two waves linked by a target, out and back, and the weight of their chain."""
 
     factor: float
     out: Passage
-    back: "Passage | Ports"  # or directly, from these
+    back: "Passage | Ports"  # ports: the direct wave
 
     @property
     def spread(self) -> float:
@@ -102,7 +103,7 @@ class Link:
 
     @property
     def nodes(self) -> int:
-        """Frequencies that the patterns of both ends, and slabs on the way, ask for."""
+        """Frequencies needed for the patterns of both ends and for slabs."""
         ends = self.out.nodes, self.back.nodes
         return sum(ends)
 
@@ -114,14 +115,14 @@ def passages_over(
     sees: Sees,
     frequencies: Float[np.ndarray, " freqs"],
 ) -> Iterator[Passage]:
-    """Prepare the ways over walls, from the facets that the ports see; for each set of slabs."""
+    """Yield the passages over a chain of walls, one for each set of slabs."""
     first = chain[0].part(np.flatnonzero(ports.visible[:, chain[0].source].any(axis=0)))
     if first.count == 0:
         return
     start, highest = float(frequencies[0]), float(frequencies[-1])
     yet: list[tuple[tuple[Face, ...], tuple[Sight, ...]]] = [((), ())]
     chain = [first, *chain[1:]]
-    for place in reversed(range(len(chain))):  # each wall's points depend on what follows
+    for place in reversed(range(len(chain))):  # each wall's points depend on the next face
         before = chain[place - 1].centres if place else ports.positions[:, :2]
         yet = [
             ((wall, *walls), (sight, *sights))
@@ -149,10 +150,9 @@ def _towards(
     sees: Sees,
     highest: float,
 ) -> Iterator[tuple[Face, Sight]]:
-    """Choose the facets of a wall that see a target, with the points that their phase needs.
+    """Yield the facets of a wall that see a target, with quadrature points, for each set of slabs.
 
-    The phase over a facet turns with the directions of the wave from ``before`` and of what
-    goes to the target. One choice for each set of slabs between them.
+    The phase over a facet depends on the directions of the wave from ``before`` and to the target.
     """
     for sight in sees.sights(wall, target):
         kept = np.flatnonzero(sight.seen.any(axis=1))
@@ -164,7 +164,7 @@ def _towards(
 def _resolved(
     wall: Face, target: Face, before: Float[np.ndarray, "points 2"], highest: float
 ) -> tuple[Face, int]:
-    """Give each facet the points that its phase needs; and tell how many."""
+    """Return the face with the quadrature points for its phase, and their number per facet."""
     low, high = np.zeros(wall.count), np.zeros(wall.count)
     for points in (before, target.centres):
         apart = outline(points)[:, None] - wall.centres

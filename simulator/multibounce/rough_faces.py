@@ -1,8 +1,8 @@
-"""Rough faces in chains of surfaces: their weights, written as sources that chains can sum.
+"""Rough faces in chains of surfaces: small-slope weights as monopole and dipole sources.
 
-Chains take the weights of :mod:`simulator.scattering.small_slope` at one frequency, over the
-coefficient of the tangent plane there, and the ends of their facets without fringe currents. The
-second order is that of the way to the middle of what a wall sees of its target.
+Chains use the weights of :mod:`simulator.scattering.small_slope` at one frequency, over the
+tangent plane's coefficient there, and no fringe currents at edges. The second order is evaluated
+for the direction to the middle of the target's visible part.
 """
 
 from typing import Any
@@ -14,13 +14,13 @@ from simulator.geometry.faces import Face
 from simulator.scattering.small_slope import MOST_ALONG, RoughLine, kernels
 
 LEAST_SPAN = 1e-3
-"""Least half angle between the directions that a rough wall's weights are met in. [rad]"""
+"""Least half angle between the directions at which a rough wall's weights are matched. [rad]"""
 
 MOST_OBLIQUE = np.radians(89.0)
-"""Most oblique direction that they are worked out for. [rad]"""
+"""Most oblique direction at which they are evaluated. [rad]"""
 
 OUTLINE = 16
-"""Facets of a target that stand for the directions to it. [-]"""
+"""Facets of a target that represent the directions to it. [-]"""
 
 
 def rough_sources(
@@ -33,24 +33,24 @@ def rough_sources(
     r"""Write a rough wall's weights as a monopole and a dipole at each facet.
 
     The weight :math:`2B/QR` (:mod:`simulator.scattering.small_slope`, first order) takes the place
-    of :math:`\cos\theta_{in} + \cos\theta_{out}`. It is met in three directions that span what the
-    wall sees of the target, by :math:`a + b\,\hat u\cdot\hat t + c\,\hat u\cdot\hat n`: between
-    them it errs by the third power of the angle they span.
+    of :math:`\cos\theta_{in} + \cos\theta_{out}`. It is matched in three directions that span the
+    target's visible part by :math:`a + b\,\hat u\cdot\hat t + c\,\hat u\cdot\hat n`: between them
+    the error is of third order in the angle they span.
 
     Parameters
     ----------
     wall
         The face, some of it rough.
     origins
-        Where the wave comes from. [m]
+        Origins of the wave. [m]
     targets, seen
-        Facets that it goes to, and which facets of the wall see them.
+        Facets to which it propagates, and which facets of the wall see them.
     frequency
-        A dielectric's kernels are taken at this one, over its coefficient there. [Hz]
+        At which a dielectric's kernels are evaluated, over its coefficient there. [Hz]
 
     Returns
     -------
-    a, b and c; 0, 0 and 1 where the wall is smooth. [-]
+    a, b and c; 0, 0 and 1 for smooth facets. [-]
     """
     normal = wall.normals
     tangent = normal[:, ::-1] * np.array([-1.0, 1.0])
@@ -71,7 +71,7 @@ def rough_sources(
     shape = sent[0].shape
     columns, values = [], []
     for share in (-1.0, 0.0, 1.0):
-        # Also where the middle is at a limit, the three angles differ.
+        # If the middle is at a limit, the three angles must still differ.
         limit = MOST_OBLIQUE + LEAST_SPAN
         out = np.clip(centre + share * margin, -limit, limit)
         receive = np.broadcast_to(np.sin(out), shape), np.broadcast_to(np.cos(out), shape)
@@ -79,7 +79,7 @@ def rough_sources(
         pair = [(t.ravel(), q.ravel()) for t, q in (sent, receive)]
         bragg = kernels(wall.material, pair[0], pair[1], at, **how).bragg.reshape(shape)
         values.append(2 * bragg / (sent[1] + receive[1]))
-    # Of the mirror that the table's coefficient is taken at.
+    # Angle of the mirror at which the table's coefficient is taken.
     ones = flat.ravel()
     sides = np.sqrt(1 - ones**2), ones
     mirrored = kernels(wall.material, (-sides[0], ones), (sides[0], ones), at, **how).mirror
@@ -154,7 +154,7 @@ def _ways(
     tangent: Float[np.ndarray, "facets 2"],
     normal: Float[np.ndarray, "facets 2"],
 ) -> tuple[Float[np.ndarray, "ports facets"], Float[np.ndarray, "ports facets"]]:
-    """Components along and off a mean surface, no closer to grazing than is asked for."""
+    """Components along and normal to a mean surface, limited to :data:`MOST_OBLIQUE`."""
     along = np.einsum("pfx,fx->pf", directions, tangent)
     upright = np.einsum("pfx,fx->pf", directions, normal)
     return along, np.maximum(upright, np.cos(MOST_OBLIQUE))
@@ -165,7 +165,7 @@ def half_angle_cosines(
     one: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
     other: Float[np.ndarray, "#ports #facets 2"] | Float[np.ndarray, " 2"],
 ) -> Float[np.ndarray, "ports facets"]:
-    """Cosines of half the angle at each facet between the ways to two points. [-]."""
+    """Cosines of half the angle at each facet between the directions to two points. [-]."""
     both = unit(one - face.centres) + unit(other - face.centres)
     return np.asarray(np.minimum(np.hypot(both[..., 0], both[..., 1]) / 2, 1.0))
 
