@@ -1,4 +1,4 @@
-"""Closed forms and series that simulator and estimator are held against.
+"""Closed forms and series to which simulator and estimator are compared.
 
 Point scatterers, plates, spheres and cylinders, mean power of rough plates, and Sionna RT's own
 paths as a second method.

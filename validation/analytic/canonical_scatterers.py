@@ -41,7 +41,7 @@ def plate_cross_section(
     -------
     Radar cross-section. [m²]
     """
-    turns = 2 * outward[:, None, :] / wavelengths[:, None]  # of phase per metre
+    turns = 2 * outward[:, None, :] / wavelengths[:, None]  # cycles of phase per metre
     pattern = np.sinc(turns[..., 0] * size[0]) * np.sinc(turns[..., 2] * size[1])
     peak = 4 * np.pi * (size[0] * size[1] / wavelengths) ** 2
     found: np.ndarray = peak * (outward[:, None, 1] * pattern) ** 2
@@ -63,9 +63,9 @@ def sphere_series(size: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 def cylinder_series(
     radius: float, distance: float, wavenumbers: Float[np.ndarray, " freqs"]
 ) -> Complex[np.ndarray, " freqs"]:
-    """Return the field that a line source gets back from a conducting cylinder, TM.
+    """Return the backscattered field of a conducting cylinder at a line source, TM.
 
-    In units of a line source, G = −(j/4)·H0⁽²⁾(kR).
+    For a unit line source, G = −(j/4)·H0⁽²⁾(kR).
     """
     total = np.zeros(wavenumbers.size, dtype=np.complex128)
     for order in range(-int(2 * radius * wavenumbers.max()), int(2 * radius * wavenumbers.max())):
@@ -81,7 +81,7 @@ def plate_facets(
     step: float,
     heights: Float[np.ndarray, "across up"] | None = None,
 ) -> Facets:
-    """Cut a conducting plate at y = 0 into triangles, with heights along y. [m]."""
+    """Divide a conducting plate at y = 0 into triangles, with heights along y. [m]."""
     x, z = (
         np.linspace(-side / 2, side / 2, int(np.ceil(side / step)) + 1) for side in (width, height)
     )
@@ -105,7 +105,7 @@ def ports(
     facets: Facets,
     visible: Bool[np.ndarray, "ports facets"] | None = None,
 ) -> Ports:
-    """Place isotropic antennas, which see all facets unless told otherwise. [m]."""
+    """Return isotropic antennas, which see all facets unless ``visible`` is given. [m]."""
     if visible is None:
         visible = np.ones((len(positions), facets.count), dtype=bool)
     return Ports(positions=positions, pattern=isotropic, visible=visible)
@@ -117,7 +117,7 @@ def facets_cross_section(
     distance: float,
     frequencies: Float[np.ndarray, " freqs"],
 ) -> Float[np.ndarray, "angles freqs"]:
-    """Simulate echoes at a distance, and take cross-sections by the radar equation. [m²]."""
+    """Simulate echoes at a distance; return cross-sections by the radar equation. [m²]."""
     port = ports(distance * outward, facets)
     field = scattered(facets, port, port, frequencies, waves="spherical")
     wavelengths = speed_of_light / frequencies
@@ -125,7 +125,7 @@ def facets_cross_section(
 
 
 def cylinder_echo_over_series() -> Complex[np.ndarray, "positions freqs"]:
-    """Simulate the echo of a conducting cylinder of 5 mm radius, over its series. [-].
+    """Return the simulated echo of a conducting cylinder of 5 mm radius over its series. [-].
 
     Between 220 and 295 GHz ka is 23 to 31.
     """
@@ -156,7 +156,7 @@ def cylinder_echo_over_series() -> Complex[np.ndarray, "positions freqs"]:
 
 
 def half_shadowed_plate() -> RadioScene:
-    """Draw a rough plate of drywall, half in a post's shadow, in space."""
+    """Return a scene of a rough drywall plate, half in a post's shadow, in 3-D."""
     scenario = parse_scenario(
         {
             "name": "plate",
@@ -195,8 +195,9 @@ def mean_specular_field(
 ) -> Float[np.ndarray, " levels"]:
     """Average the specular field of rough conducting plates at 275 GHz and 40°.
 
-    There are eight facets for each correlation length: the planes between vertices have 1 % less
-    variance than the surface, with four 4 %, which alone is 13 % of the field at level 1.2.
+    There are eight facets per correlation length: linear interpolation between vertices lowers the
+    variance of heights by 1 %; with four facets by 4 %, which changes the field at level 1.2 by
+    13 %.
 
     Parameters
     ----------
@@ -205,9 +206,9 @@ def mean_specular_field(
     side, length
         Of the square plates, and the correlation length. [m]
     draws
-        How many plates.
+        Number of plates.
     advance
-        Told the plates done and their number.
+        Called with the number of plates done and in all.
 
     Returns
     -------

@@ -6,7 +6,7 @@ from scipy.special import fresnel
 
 
 def fresnel_tail(x: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
-    """Integrate exp(-jt²) from x on, over that from minus infinity on. [-]."""
+    """Return the integral of exp(-jt²) from x to infinity, over that of the whole line. [-]."""
     sine, cosine = fresnel(np.sqrt(2 / np.pi) * x)
     return np.asarray((1 + 1j) / 2 * ((0.5 - cosine) - 1j * (0.5 - sine)))
 
@@ -18,16 +18,16 @@ def half_plane_over_free_space(
     *,
     reflection: float,
 ) -> Complex[np.ndarray, "places freqs"]:
-    """Divide the total field by that of the plane wave alone (Born and Wolf, 11.5).
+    """Return the total field over that of the plane wave alone (Born and Wolf, 11.5). [-].
 
     Parameters
     ----------
     incident, outgoing
-        Angles from the half plane to where the wave comes from, and to the places. [rad]
+        Angles from the half plane to the direction of incidence, and to the places. [rad]
     phase
         Wavenumber times the distance from the edge. [rad]
     reflection
-        -1: the electric field is along the edge; 1: the magnetic one; 0: the screen is black.
+        -1: the electric field is along the edge; 1: the magnetic field; 0: a black screen. [-]
     """
     total = np.zeros(phase.shape, dtype=np.complex128)
     for angles, weight in ((outgoing - incident, 1.0), (outgoing + incident, reflection)):

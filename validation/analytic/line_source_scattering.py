@@ -1,8 +1,8 @@
-r"""Closed forms of what a line source's field becomes at a cylinder, a wedge and a slab.
+r"""Closed forms of the field of a line source scattered by a cylinder, a wedge and a slab.
 
 Two dimensions, :math:`e^{+j\omega t}`, unit line sources :math:`-\tfrac j4 H_0^{(2)}(kR)` of
-:math:`E_z` (TM) or :math:`H_z` (TE). All are analytic in the source's place, so they hold for a
-beam as well, which is a source of complex place (:mod:`validation.full_wave.line_source`).
+:math:`E_z` (TM) or :math:`H_z` (TE). All are analytic in the source's position, so they hold for a
+beam as well, which is a source at a complex position (:mod:`validation.full_wave.line_source`).
 """
 
 from typing import Literal
@@ -16,10 +16,10 @@ from simulator.materials.fresnel_slab import slab
 from validation.full_wave.line_source import LineSource
 
 MORE_ORDERS = 40
-"""Orders beyond the argument, where Bessel functions have long fallen below rounding. [-]"""
+"""Orders beyond the argument, at which Bessel functions are below rounding. [-]"""
 
 ANGLES = 4000
-"""Plane waves of which a beam at a slab is made. [-]"""
+"""Plane waves of the spectrum of a beam at a slab. [-]"""
 
 
 def cylinder_field(
@@ -31,7 +31,7 @@ def cylinder_field(
     permittivity: complex | None,
     polarisation: Literal["TM", "TE"],
 ) -> complex:
-    r"""Return the field that a circular cylinder at the origin scatters.
+    r"""Return the field scattered by a circular cylinder at the origin.
 
     .. math:: u = \tfrac j4 \sum_m c_m H_m^{(2)}(k r) H_m^{(2)}(k r_0)\, e^{jm(\varphi-\varphi_0)}
 
@@ -90,13 +90,13 @@ def wedge_field(
     Parameters
     ----------
     source
-        Farther from the edge than the receiver; a beam has a displacement.
+        Farther from the edge than the receiver; a beam has a complex displacement.
     receiver
         [m].
     wavenumber
         [rad/m].
     open_angle
-        :math:`\beta`, of the air. [rad]
+        :math:`\beta`, the exterior angle (in air). [rad]
     polarisation
         TM or TE.
     """
@@ -133,9 +133,9 @@ def slab_fields(
     thickness: float,
     polarisation: Literal["TM", "TE"],
 ) -> tuple[complex, complex]:
-    r"""Return what an infinite slab in :math:`-d < y < 0` adds to a beam, above and below it.
+    r"""Return the change of a beam by an infinite slab in :math:`-d < y < 0`, above and below it.
 
-    The beam is a sum of plane waves, of which each is reflected and transmitted after Airy:
+    The beam is a sum of plane waves, each reflected and transmitted by Airy's coefficients:
 
     .. math:: u = -\frac{j}{4\pi} \int R(\theta)\, e^{-jk[\sin\theta (x-x_0) + \cos\theta (y+y_0)]}
               \,d\theta
@@ -171,7 +171,7 @@ def slab_fields(
     weight = -0.25j * np.exp(-wavenumber * source.displacement) / ANGLES
     above = sine * (reflected_at[0] - place[0]) + cosine * (reflected_at[1] + place[1])
     below = sine * (transmitted_at[0] - place[0])
-    # The slab's phase is counted from its upper to its lower face.
+    # The transmission's phase is from the slab's upper to its lower face.
     below = below + cosine * (place[1] - transmitted_at[1] - thickness)
     reflected = weight * np.sum(reflection * np.exp(-1j * wavenumber * above))
     transmitted = weight * np.sum(transmission * np.exp(-1j * wavenumber * below))

@@ -1,4 +1,4 @@
-"""Ideal points in free space, in closed form: the oracle that shares no code with the rest."""
+"""Ideal points in free space, in closed form, as a reference without the simulator's code."""
 
 import numpy as np
 from jaxtyping import Float
@@ -18,7 +18,7 @@ def point_echo(
     transmit_positions: Float[np.ndarray, "positions 3"] | None = None,
     waves: Waves = "spherical",
 ) -> Echo:
-    r"""Evaluate the radar equation for points that do not see each other.
+    r"""Evaluate the radar equation for points without multiple scattering.
 
     .. math:: S = \frac{\lambda \sqrt{\sigma}}{(4 \pi)^{3/2} R_t R_r}
               e^{-j k (R_t + R_r) + j \varphi}
@@ -26,7 +26,7 @@ def point_echo(
     Parameters
     ----------
     targets
-        Where they are. [m]
+        Their positions. [m]
     positions
         Phase centres of the isotropic antenna. [m]
     frequencies
@@ -36,9 +36,9 @@ def point_echo(
     phase
         Of each target; ``None``: 0. [rad]
     transmit_positions
-        Transmitters that stand apart; ``None``: monostatic. [m]
+        Separate transmitters; ``None``: monostatic. [m]
     waves
-        Cylindrical waves miss the spreading along z, the square root of the total length.
+        Cylindrical waves lack the spreading along z, the square root of the total length.
     """
     transmit = positions if transmit_positions is None else transmit_positions
     wavelength = speed_of_light / frequencies
@@ -73,12 +73,12 @@ def point_uplink(
 ) -> Uplink:
     r"""Evaluate Friis' equation :math:`S = \lambda / (4 \pi R)\, e^{-jkR}` for each source.
 
-    Several sources stand for the images of one user in mirrors.
+    Several sources represent the images of one user in mirrors.
 
     Parameters
     ----------
     sources
-        Where they are. [m]
+        Their positions. [m]
     positions
         Elements. [m]
     frequencies
@@ -86,7 +86,7 @@ def point_uplink(
     amplitude, phase
         Of each source, relative to an isotropic one; ``None``: 1 and 0. [-], [rad]
     waves
-        Cylindrical waves miss the spreading along z, the square root of the length.
+        Cylindrical waves lack the spreading along z, the square root of the length.
     user
         The user's name.
     """

@@ -1,7 +1,7 @@
-r"""What a rough plate scatters on average between two antennas: closed forms to compare with.
+r"""Mean scattering of a rough plate between two antennas, in closed form.
 
-The Kirchhoff approximation with Gaussian heights and a Gaussian correlation [1]_, here for
-antennas nearby: of the link
+The Kirchhoff approximation with Gaussian heights and a Gaussian correlation [1]_, for antennas at
+finite distances: for the link
 
 .. math:: S = \frac{jk}{\lambda} \int \Gamma\, (\hat n \cdot \mathbf q)\, h_t h_r\,
           e^{jk q_z \zeta}\, dA, \qquad
@@ -9,16 +9,17 @@ antennas nearby: of the link
 
 the mean is that of the smooth plate times :math:`e^{-s/2}`, :math:`s = k^2 q_z^2 \sigma^2`. The
 slopes in :math:`\hat n` are integrated by parts, which turns :math:`\hat n \cdot \mathbf q`
-into :math:`|\mathbf q|^2 / q_z`, and the mean power of what is left is
+into :math:`|\mathbf q|^2 / q_z`, and the mean power of the remaining, diffuse part is
 
 .. math:: \langle |S_d|^2 \rangle = \int \Bigl|\frac{k}{\lambda} \Gamma
           \frac{|\mathbf q|^2}{q_z} h_t h_r\Bigr|^2 B \, dA, \qquad
           B = \pi l^2 e^{-s} \sum_{n \ge 1} \frac{s^n}{n!\, n}
           e^{-k^2 q_\parallel^2 l^2 / 4n}
 
-For :math:`s \ll 1` the first term is left, :math:`B = (2\pi)^2 k^2 q_z^2 W(k q_\parallel)` with the
-spectrum :math:`W` of the heights: the Bragg wave. Its weight is that of small perturbations (Rice
-1951), of which the tangent plane's :math:`\Gamma |\mathbf q|^2 / q_z` is the long-waved limit.
+For :math:`s \ll 1` the first term dominates, :math:`B = (2\pi)^2 k^2 q_z^2 W(k q_\parallel)` with
+the spectrum :math:`W` of the heights: Bragg scattering. Its weight is that of small perturbations
+(Rice 1951), of which the tangent plane's :math:`\Gamma |\mathbf q|^2 / q_z` is the limit of long
+correlation lengths.
 
 References
 ----------
@@ -43,7 +44,7 @@ from simulator.materials.fresnel_slab import Material
 from simulator.scattering.weighted_curvature import middle_permittivity, scattering_kernel
 
 TERMS = 30
-"""Terms of the series: for s below 5 what is left out is below 1e-12. [-]"""
+"""Terms of the series: for s below 5 the remainder is below 1e-12. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,17 +73,17 @@ def mean_diffuse_power(
     Parameters
     ----------
     plate
-        With a height; its roughness is not looked at.
+        With a height; its own roughness is not used.
     roughness
         Gaussian.
     material
-        Reflects as :mod:`simulator.materials.facet_reflection` says.
+        Of the plate; see :mod:`simulator.materials.facet_reflection`.
     antennas
         Both ends.
     frequency
         [Hz].
     cells
-        Cells of the integral along each side: what varies are beams and directions only.
+        Cells of the integral along each side: only beams and directions vary over the plate. [-]
 
     Returns
     -------
@@ -137,7 +138,7 @@ def mean_diffuse_power(
 def coherent_loss(
     plate: Plate, roughness: Roughness, antennas: Antennas, frequency: float
 ) -> float:
-    r"""Return what roughness leaves of the mean field, :math:`e^{-s/2}` at the centre. [-]."""
+    r"""Return the mean field over that of a smooth plate, :math:`e^{-s/2}` at the centre. [-]."""
     across = 0.0
     for position in (antennas.transmit_position, antennas.receive_position):
         offset = position - plate.centre
@@ -147,7 +148,7 @@ def coherent_loss(
 
 
 def mirror_link(plate: Plate, antennas: Antennas, frequency: float) -> complex:
-    r"""Return the link over an endless conducting mirror in the plate's plane.
+    r"""Return the link over an infinite conducting mirror in the plate's plane.
 
     .. math:: S = -g_t g_r \frac{\lambda}{4 \pi L} e^{-jkL}
 

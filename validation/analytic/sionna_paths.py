@@ -1,8 +1,8 @@
-"""Our specular chains beside Sionna RT's deterministic path solver, on random scenes in space.
+"""Our specular chains against Sionna RT's deterministic path solver, on random 3-D scenes.
 
-The two share the positions and the materials' constants, nothing else: ours are images in
-double precision with an analytic occlusion test, theirs are candidates from launched rays,
-single precision, Mitsuba's intersections.
+Both use the same positions and material constants, nothing else: our chains are images in double
+precision with an analytic occlusion test; Sionna's are candidates from launched rays in single
+precision, with Mitsuba's intersections.
 """
 
 from dataclasses import dataclass
@@ -20,26 +20,26 @@ from simulator.specular.image_method import Blocked, find_chains
 from simulator.specular.path_field import reflected_field
 
 FREQUENCY = 275e9  # [Hz]
-LIMIT_LENGTH = 1e-6  # how far lengths may be apart [m]
-LIMIT_AMPLITUDE = 0.01  # and amplitudes, of the larger of theirs and NULL of free space's [-]
+LIMIT_LENGTH = 1e-6  # largest difference of lengths [m]
+LIMIT_AMPLITUDE = 0.01  # of amplitudes, over the larger of Sionna's and NULL times free space's [-]
 
 EDGE = 1e-4
-"""Hits and legs closer than this to an edge may be decided either way: theirs are found in single
-precision, whose rounding over some metres and several reflections comes to a few µm. [m]"""
+"""Distance from an edge below which a path may exist in one result only: Sionna's hits are in
+single precision, whose rounding over some metres and several reflections is a few µm. [m]"""
 
 SHORTEST_LEG = 1e-2
-"""The path solver drops paths with a leg below its MIN_SEGMENT_LENGTH. [m]"""
+"""Shortest leg of a compared path: the path solver drops legs below MIN_SEGMENT_LENGTH. [m]"""
 
 RAYS = 300_000
-"""Rays that the path solver launches to find candidates."""
+"""Rays that the path solver launches to find candidates. [-]"""
 
 THICKNESS = (0.5e-3, 5e-3)
-"""Thickness of slabs. Beyond some 80 rad of phase across the slab the single-precision sine of
-Dr.Jit errs by 1e-4 and more, measured on the solver's own slab formula. [m]"""
+"""Range of slab thickness. Beyond some 80 rad of phase across the slab the error of Dr.Jit's
+single-precision sine is 1e-4 and more, measured on the solver's own slab formula. [m]"""
 
 NULL = 0.01
-"""A coefficient below this (a slab's null, Brewster's angle) counts as this: hits that are
-rounded to 1 µm on a leg of centimetres turn the angle by 1e-4 and the coefficient by as much."""
+"""Least coefficient in the relative error (near a slab's null or Brewster's angle): rounding hits
+to 1 µm on a leg of centimetres changes the angle by 1e-4, and the coefficient by as much. [-]"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def _plate_or_box(rng: np.random.Generator, upright: bool) -> np.ndarray:
             face[:, (axis + 2) % 3] = [-1, -1, 1, 1]
             faces.append(face * half)
     quadrilaterals = np.array(faces if box else faces[-1:])
-    if upright:  # as the walls of most scenes; a plate stands on its edge
+    if upright:  # like the walls of most scenes; a plate stands on its edge
         stand = np.eye(3) if box else Rotation.from_euler("x", 90, degrees=True).as_matrix()
         turn = Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix() @ stand
     else:
@@ -95,7 +95,7 @@ def _plate_or_box(rng: np.random.Generator, upright: bool) -> np.ndarray:
 
 
 def _crossings(corners: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Which segments (first axis) cross which rectangles (second axis)."""
+    """Return which segments (first axis) cross which rectangles (second axis)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
     normals = np.cross(first, second)
     before = np.einsum("smx,mx->sm", starts[:, None] - corners[:, 0], normals)
@@ -114,13 +114,13 @@ def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _holds(faces: np.ndarray, point: np.ndarray) -> bool:
-    """Whether a box holds a point."""
+    """Return whether a point is inside a box."""
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 3] - faces[:, 0])
     return len(faces) > 1 and bool(np.all(np.sum(normals * (point - faces[:, 0]), axis=1) < 0))
 
 
 def random_scene(seed: int) -> RandomScene:
-    """Put six to nine plates and boxes into a cubic metre that do not cut each other."""
+    """Return six to nine plates and boxes in a cubic metre that do not intersect."""
     rng = np.random.default_rng(seed)
     objects: list[np.ndarray] = []
     count = rng.integers(6, 10)
@@ -140,7 +140,7 @@ def random_scene(seed: int) -> RandomScene:
         if not any(_holds(faces, point) for faces in objects):
             points.append(point)
     constants = [
-        (1.0 - 1e9j, 0.1)  # as good as a conductor
+        (1.0 - 1e9j, 0.1)  # practically a conductor
         if rng.random() < 0.3
         else (complex(rng.uniform(1.5, 6.0), -rng.uniform(0.0, 0.3)), rng.uniform(*THICKNESS))
         for _ in objects
@@ -149,7 +149,7 @@ def random_scene(seed: int) -> RandomScene:
 
 
 def our_paths(scene: RandomScene, blocked: Blocked | None = None) -> Paths:
-    """Find chains of up to three mirrors; occlusion is analytic unless told otherwise."""
+    """Find chains of up to three mirrors; occlusion is analytic unless ``blocked`` is given."""
     surfaces: list[Material] = []
     for (permittivity, thickness), faces in zip(scene.constants, scene.objects, strict=True):
         perfect = permittivity.imag < -1e6
@@ -214,21 +214,21 @@ def solver_scene(scene: RandomScene) -> tuple[Any, list[Any]]:
 
 
 class Solved(NamedTuple):
-    """What the path solver found; the two antennas and the source are single."""
+    """Result of the path solver, for one source and single antennas."""
 
     bodies: list[Any]  # as the scene's objects
     valid: Bool[np.ndarray, "receivers paths"]
     delays: Float[np.ndarray, "receivers paths"]  # [s]
     amplitudes: Complex[np.ndarray, "receivers paths"]  # [-]
     kinds: np.ndarray  # of interaction, [depth, receivers, paths]; 0 beyond the last
-    shapes: np.ndarray  # body of each
-    triangles: np.ndarray  # and which of its triangles
-    vertices: np.ndarray  # and where, with x, y, z last [m]
+    shapes: np.ndarray  # body of each interaction
+    triangles: np.ndarray  # triangle of each, in its body
+    vertices: np.ndarray  # point of each, with x, y, z last [m]
 
     def points(
         self, scene: RandomScene, receiver: int, index: int
     ) -> Float[np.ndarray, "points 3"]:
-        """Return a path from the source over what it meets to the receiver. [m]."""
+        """Return the points of a path: source, interactions, receiver. [m]."""
         depth = int(np.count_nonzero(self.kinds[:, receiver, index]))
         hits = self.vertices[:depth, receiver, index].astype(float)
         return np.array([scene.points[0], *hits, scene.points[1 + receiver]])
@@ -263,7 +263,7 @@ def solved(scene: RandomScene, *, max_depth: int, refraction: bool) -> Solved:
 
 
 def solver_paths(scene: RandomScene) -> Paths:
-    """Let the path solver find the paths of up to three bounces."""
+    """Return the path solver's paths of up to three bounces."""
     them = solved(scene, max_depth=3, refraction=False)
     first_face = dict(
         zip(
@@ -311,12 +311,12 @@ def distance_from_edges(path: Path, corners: np.ndarray) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Both ways' paths in one scene, beside each other."""
+    """Comparison of the paths of both methods in one scene."""
 
-    bounces: tuple[int, ...]  # of each path that both found
+    bounces: tuple[int, ...]  # of each path found by both
     length: float  # largest difference of lengths [m]
-    amplitude: float  # largest difference of amplitudes, over theirs [-]
-    alone: tuple[tuple[int, tuple[int, ...]], ...]  # found by only one, though far from edges
+    amplitude: float  # largest difference of amplitudes, relative to Sionna's [-]
+    alone: tuple[tuple[int, tuple[int, ...]], ...]  # found by one only, far from edges
 
     @property
     def passed(self) -> bool:
@@ -326,10 +326,10 @@ class Comparison:
 
 
 def compare_paths(scene: RandomScene) -> Comparison:
-    """Find the paths of a scene in both ways.
+    """Find the paths of a scene by both methods.
 
-    What lies within :data:`EDGE` of an edge, or has a leg that the solver drops, may be found by
-    only one.
+    Paths within :data:`EDGE` of an edge, or with a leg that the solver drops, may be found by one
+    only.
     """
     ours, theirs = our_paths(scene), solver_paths(scene)
     alone = []

@@ -1,7 +1,7 @@
-"""Our paths through slabs beside Sionna RT's with refraction, on random scenes in space.
+"""Our paths through slabs against Sionna RT's with refraction, on random 3-D scenes.
 
-Both know thin plates at whose place a slab's coefficient multiplies; theirs leave the air that the
-slab takes the place of, and its bending of rays, out of the path, which concerns the phase only.
+Both model thin plates whose coefficient multiplies the field. Sionna's paths ignore the air in the
+slab's place and the refraction of rays, which affects the phase only.
 """
 
 from dataclasses import dataclass
@@ -28,23 +28,23 @@ from validation.analytic.sionna_paths import (
 )
 
 REFRACTION = 4
-"""Their name of what goes through. [-]"""
+"""Sionna's code of an interaction by transmission. [-]"""
 
 MOST_MET = 3
-"""Surfaces that a path meets at most, reflected or let through. [-]"""
+"""Most interactions of a path, reflections and transmissions together. [-]"""
 
 WEAKEST_DB = 30.0
-"""How far below a receiver's strongest path the others are compared. [dB]"""
+"""Level below a receiver's strongest path down to which paths are compared. [dB]"""
 
 Met = tuple[int, bool]
-"""A plate, and whether the path goes through it."""
+"""A plate, and whether the path is transmitted by it."""
 
 Paths = dict[tuple[int, tuple[Met, ...]], Path]
-"""By receiver, and what is met on the way."""
+"""Paths by receiver and sequence of interactions."""
 
 
 def slab_scene(seed: int) -> RandomScene:
-    """Draw upright and tilted plates in a cubic metre, all of them slabs."""
+    """Return upright and tilted plates in a cubic metre, all of them slabs."""
     drawn, rng = random_scene(seed), np.random.default_rng((seed, 17))
     plates = [faces for faces in drawn.objects if len(faces) == 1]
     constants = [
@@ -55,7 +55,7 @@ def slab_scene(seed: int) -> RandomScene:
 
 
 def our_paths(scene: RandomScene) -> Paths:
-    """Find chains of mirrors and slabs that meet up to three plates."""
+    """Find paths with up to three interactions with plates."""
     materials = tuple(
         Dielectric(permittivity=ConstantPermittivity(value=value), thickness=thickness)
         for value, thickness in scene.constants
@@ -94,7 +94,7 @@ def our_paths(scene: RandomScene) -> Paths:
 
 
 def solver_paths(scene: RandomScene) -> Paths:
-    """Let the path solver find the paths, with refraction."""
+    """Return the path solver's paths, with refraction."""
     them = solved(scene, max_depth=MOST_MET, refraction=True)
     plate = {body.object_id: index for index, body in enumerate(them.bodies)}
     found: Paths = {}
@@ -114,16 +114,16 @@ def solver_paths(scene: RandomScene) -> Paths:
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """Both ways' paths in one scene."""
+    """Comparison of the paths of both methods in one scene."""
 
-    through: int  # paths through at least one slab that both found
+    through: int  # paths through at least one slab, found by both
     level: float  # largest difference of levels [dB]
-    length: float  # and of lengths [m]
-    alone: tuple[tuple[int, tuple[Met, ...]], ...]  # found by only one, though far from edges
+    length: float  # largest difference of lengths [m]
+    alone: tuple[tuple[int, tuple[Met, ...]], ...]  # found by one only, far from edges
 
 
 def compare_transmission(scene: RandomScene) -> Compared:
-    """Find the paths of a scene in both ways; what is faint, or near an edge, is left out."""
+    """Compare the paths of a scene by both methods, without faint ones and those near edges."""
     ours, theirs = our_paths(scene), solver_paths(scene)
     strongest: dict[int, float] = {}
     for found in (ours, theirs):

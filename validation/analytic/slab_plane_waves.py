@@ -3,18 +3,19 @@ r"""A slab between a line source and a receiver, exactly: the integral over all 
 .. math:: \frac{E}{E_0} = \frac{\int T(\alpha) e^{jkd\cos\alpha} e^{-jkL\cos(\alpha - \theta)}
                                 d\alpha}{\int e^{-jkL\cos(\alpha - \theta)} d\alpha}
 
-along the path of steepest descent of the free wave. The slab's :math:`T` comes from the matrix of
-its layer (Born and Wolf, 1.6.2), not from the sum of its inner echoes that the simulator takes.
+along the path of steepest descent of the free wave. The slab's :math:`T` is computed by the
+characteristic matrix of a layer (Born and Wolf, 1.6.2), independent of the simulator's sum of
+internal reflections.
 """
 
 import numpy as np
 from scipy.constants import speed_of_light
 
 STEPS = 20001
-"""Points along the path of descent. [-]"""
+"""Points along the path of steepest descent. [-]"""
 
 REACH = 1.2
-"""How far the path goes to either side: the wave is down by exp(-kL·0.8) there. [rad]"""
+"""Extent of the path to either side: the integrand is smaller by exp(-kL·0.8) there. [rad]"""
 
 
 def slab_over_air(
@@ -26,7 +27,7 @@ def slab_over_air(
     frequency: float,
     vertical: bool,
 ) -> complex:
-    """Divide the field of a line source behind a slab by that without it.
+    """Return the field of a line source behind a slab over that without it. [-].
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Bounds on errors: Cramér–Rao for waves, walls and positions, and the floor by roughness.
 
-No unbiased estimator is better than these; ours is compared with them.
+No unbiased estimator has a smaller variance; ours is compared with these bounds.
 """
 
 import lazy_loader

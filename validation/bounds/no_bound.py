@@ -1,5 +1,5 @@
-"""What bounds raise where a scene has none."""
+"""The exception raised if a scene has no bound."""
 
 
 class NoBound(ValueError):  # noqa: N818  an answer, not a fault
-    """A scene has no bound of this kind: nothing fixes it, or no closed form is known."""
+    """A scene has no such bound: the parameter is not determined, or no closed form is known."""

@@ -1,23 +1,23 @@
 r"""Position error bound: Cramér-Rao, near field and wide band, over any number of mirrors.
 
-Element m hears path i from the user's image :math:`p_i` in the mirrors of that path,
+Element m receives path i from the user's image :math:`p_i` in the mirrors of that path,
 
 .. math:: u_{mn} = \sum_i g_i\, a_{imn}\, e^{-j k_n r_{im}}, \qquad
           r_{im} = \lVert p_i - q_m \rVert ,
 
 in white circular noise of variance σ². The unknowns are the user's position x, the mirrors'
-turns and offsets y, the clock's offset as a length b and the complex gains :math:`g_i`. With the
-Jacobian :math:`J` of u, its Fisher information is :math:`F = (2/\sigma^2) \Re(J^H J)`; what is
-known beforehand of y and b (a Gaussian prior: the hybrid bound) adds the inverse of its
-covariance; the block of x of the inverse of F bounds the covariance of any unbiased estimate, and
-the root of its trace is the *position error bound*. All paths are heard at once, so that it holds
-the loss by their overlap.
+rotations and offsets y, the clock's offset as a length b and the complex gains :math:`g_i`. With
+the Jacobian :math:`J` of u, the Fisher information is :math:`F = (2/\sigma^2) \Re(J^H J)`; Gaussian
+priors of y and b add the inverses of their covariances (hybrid bound); the block of x of the
+inverse of F bounds the covariance of any unbiased estimate, and the root of its trace is the
+*position error bound*. All paths are received together, so the bound includes the loss by their
+overlap.
 
-The phases alone carry the information: the amplitudes' own dependence on the position adds a
-share of :math:`1/(kr)^2` (2e-8 at 1 m and 250 GHz) and is left out, as in
-:mod:`validation.bounds.cramer_rao`. A gain that is known makes the carrier's phase a ruler: then
-the bound is that of the summit of one of many maxima, half a wavelength apart, and no estimator
-reaches it below some SNR.
+Only phases are used: the amplitudes' dependence on the position adds a relative information of
+:math:`1/(kr)^2` (2e-8 at 1 m and 250 GHz) and is left out, as in
+:mod:`validation.bounds.cramer_rao`. If gains are known, the carrier's phase measures distance: then
+the bound is the width of one of many maxima of the likelihood, half a wavelength apart, and no
+estimator reaches it below some SNR.
 """
 
 from collections.abc import Sequence
@@ -30,13 +30,13 @@ from scipy.constants import speed_of_light
 from validation.bounds.no_bound import NoBound
 
 LEAST_CONDITION = 1e-12
-"""Least eigenvalue of the information, scaled to a unit diagonal, at which positions are fixed:
-below it the inverse has lost twelve of sixteen digits. [-]"""
+"""Least eigenvalue of the information, scaled to a unit diagonal, at which a position counts as
+determined: below it the inverse has lost twelve of sixteen digits. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plane:
-    """A flat mirror's plane, and the point that its turns and offset are counted at."""
+    """A flat mirror's plane, and the reference point of its rotations and offset."""
 
     point: Float[np.ndarray, " 3"]  # [m]
     normal: Float[np.ndarray, " 3"]  # unit vector, to the side that reflects
@@ -46,7 +46,7 @@ class Plane:
 class PositionBound:
     """The smallest covariance of a position, and its measure."""
 
-    covariance: Float[np.ndarray, "axes axes"]  # of x, y (and in space z) [m²]
+    covariance: Float[np.ndarray, "axes axes"]  # of x, y (and in 3-D z) [m²]
 
     @property
     def deviation(self) -> float:
@@ -60,7 +60,7 @@ class PositionBound:
         return float(np.median(np.sqrt(_NORMAL[:, : eigenvalues.size] ** 2 @ eigenvalues)))
 
 
-_NORMAL = np.random.default_rng(0).standard_normal((100_000, 3))  # medians good to 0.4 %
+_NORMAL = np.random.default_rng(0).standard_normal((100_000, 3))  # error of medians 0.4 %
 
 
 def position_error_bound(
@@ -92,26 +92,26 @@ def position_error_bound(
     planes
         The mirrors' planes.
     paths
-        Of each path the indices of its mirrors, from the array outward; ``()`` is direct.
+        Indices of each path's mirrors, from the array outward; ``()`` is the direct path.
     waves
-        Each path's noise-free part of the samples, zero where it is not heard; ``None``: paths
+        Each path's noise-free part of the samples, zero where it is not received; ``None``: those
         of :func:`spherical_waves`.
     dimensions
         2: in the plane z = 0, planes upright; 3.
     gains_known
         Whether the paths' complex gains, the carrier's phase at the user included, are known.
     plane_covariance
-        What is known of the planes beforehand: of each plane's (turn about +z [rad], offset
-        along its normal [m]) in two dimensions, of (turn of the horizontal axis, turn of the
-        axis across it, both towards the normal [rad], offset [m]) in three; one plane after
-        another. ``None``: they are known.
+        Prior covariance of the planes, one after another: of (rotation about +z [rad], offset
+        along the normal [m]) in two dimensions; of (rotation of the horizontal axis, rotation of
+        the axis across it, both towards the normal [rad], offset [m]) in three. ``None``: they are
+        known exactly.
     clock_deviation
-        Standard deviation of the user's clock against the array's; infinite: unknown. [s]
+        Prior standard deviation of the user's clock offset; infinite: unknown. [s]
 
     Raises
     ------
     ValueError
-        If sizes do not fit, or these paths do not fix the position.
+        If sizes do not agree, or these paths do not determine the position.
     """
     if waves is None:
         waves = spherical_waves(
@@ -187,21 +187,20 @@ def fisher_information(
     noise_variance: float,
     gains_known: bool = False,
 ) -> Float[np.ndarray, "all all"]:
-    """Return the Fisher information of what changes the paths' lengths, then of the gains.
+    """Return the Fisher information of the parameters of path lengths, then of the gains.
 
     Parameters
     ----------
     waves
         Noise-free parts of the samples.
     slopes
-        Of the lengths by each parameter. [m per unit of it]
+        Derivatives of the lengths by each parameter. [m per unit of it]
     frequencies
         [Hz]
     noise_variance
         Per complex sample. [-]
     gains_known
-        Otherwise two more rows for each path, for the relative change of its gain and for its
-        phase.
+        If not, each path adds two parameters: the relative change of its gain, and its phase.
     """
     rows = jacobian(waves, slopes, frequencies=frequencies, gains_known=gains_known)
     information = np.empty((len(rows), len(rows)))
@@ -219,7 +218,7 @@ def jacobian(
     frequencies: Float[np.ndarray, " freqs"],
     gains_known: bool = False,
 ) -> Complex[np.ndarray, "all elements freqs"]:
-    """Differentiate the samples by what changes the paths' lengths, then by the paths' gains."""
+    """Differentiate the samples by the parameters of path lengths, then by the paths' gains."""
     wavenumbers = 2 * np.pi * frequencies / speed_of_light
     rows = [
         -1j * wavenumbers * (waves * slopes[..., index, None]).sum(axis=0)
@@ -253,11 +252,11 @@ def path_slopes(
     rays = image - positions
     units = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     columns = [by_user[:, :dimensions]]
-    # In the plane z = 0 an upright mirror has no turn of the axis across.
+    # In the plane z = 0 an upright mirror has no rotation of the axis across.
     kept = [0, 2] if dimensions == 2 else [0, 1, 2]
     for plane, by_plane in zip(planes, by_planes, strict=True):
         chosen = by_plane[:, kept]
-        if dimensions == 2:  # about +z; towards the normal it is the other way round
+        if dimensions == 2:  # about +z: opposite to the rotation towards the normal
             chosen = chosen * [-1.0, 1.0]
             if abs(plane.normal[2]) > 1e-9:
                 raise ValueError(
@@ -271,7 +270,7 @@ def path_slopes(
 def image_and_slopes(
     user: Float[np.ndarray, " 3"], path: tuple[int, ...], planes: Sequence[Plane]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, "3 3"], Float[np.ndarray, "planes 3 3"]]:
-    """Mirror a user as the array sees it, and differentiate its image.
+    """Return the image of a user in a path's mirrors, and its derivatives.
 
     Parameters
     ----------
@@ -292,7 +291,7 @@ def image_and_slopes(
         turning = np.eye(3) - 2 * np.outer(normal, normal)
         by_user, by_planes = turning @ by_user, turning @ by_planes
         for column, axis in enumerate(plane_axes(normal)):
-            # An axis that turns towards the normal turns the normal away from the axis.
+            # If an axis rotates towards the normal, the normal rotates away from the axis.
             slope = 2 * (axis * height + normal * float(axis @ (image - plane.point)))
             by_planes[index, :, column] += slope
         by_planes[index, :, 2] += 2 * normal
@@ -319,7 +318,7 @@ def _joined(
 
 
 def _inverse(information: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
-    """Invert an information whose parameters have different units."""
+    """Invert an information matrix whose parameters have different units."""
     scale = 1 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     scaled = information * np.outer(scale, scale)
     least = float(np.linalg.eigvalsh(scaled)[0])

@@ -1,21 +1,21 @@
-r"""What a known wall's roughness costs: the position error by the bending of the reflected wave.
+r"""Position error by a known wall's roughness, which distorts the reflected wavefront.
 
 Heights h of a wall add to its physical-optics field at element m and frequency n, to first order,
 
 .. math:: \delta u_{mn} = j k_n \int h(x)\, (\cos\theta_i + \cos\theta_s)\, K_{mn}(x)\, dx ,
           \qquad \int K_{mn}(x)\, dx = u_{mn} ,
 
-and a least-squares fit of a spherical wave of unknown gain, which is what an estimator without
-knowledge of h can do, moves by :math:`\delta\theta = (\Re J^H J)^{-1} \Re(J^H \delta u) =
-\int h(x)\, w(x)\, dx`. The heights being Gaussian of correlation function C, the position is so
-too, and
+and a least-squares fit of a spherical wave of unknown gain, the best that an estimator without
+knowledge of h can do, is displaced by :math:`\delta\theta = (\Re J^H J)^{-1} \Re(J^H \delta u) =
+\int h(x)\, w(x)\, dx`. With Gaussian heights of correlation function C, the position is Gaussian
+too, with
 
 .. math:: \operatorname{cov} = \iint w(x)\, C(x - x')\, w(x')^T\, dx\, dx' .
 
-It does not depend on the noise: it is the floor that more SNR does not lower. Assumed: two
-dimensions, one bounce, the wall's mean plane known, the wall flat but for h, and k h small (first
-order: a phase :math:`k\sigma(\cos\theta_i+\cos\theta_s)` of half a radian or less; beyond it the
-diffuse part grows as :math:`e^{\varphi^2} - 1` instead of :math:`\varphi^2`).
+It does not depend on the noise: more SNR does not lower this floor. Assumptions: two dimensions,
+one bounce, the wall's mean plane known, the wall flat except for h, and k h small (first order: a
+phase :math:`k\sigma(\cos\theta_i+\cos\theta_s)` of half a radian or less; beyond, the diffuse part
+grows as :math:`e^{\varphi^2} - 1` instead of :math:`\varphi^2`).
 """
 
 from dataclasses import dataclass
@@ -41,16 +41,17 @@ from validation.bounds.position_bound import (
 )
 
 FREQUENCIES = 24
-"""Frequencies that stand for the sweep: 3 GHz apart over 75 GHz, 0.1 m of path, four times what
-the ways over 20 cm of wall to either side differ by at 1 m; 101 change it by 1e-3. [-]"""
+"""Frequencies that represent the sweep: 3 GHz apart over 75 GHz, unambiguous for 0.1 m of path,
+four times the difference of paths over 20 cm of wall to either side at 1 m; 101 change the result
+by 1e-3. [-]"""
 
 STEPS_PER_DETAIL = 4.0
-"""Places on the wall for each correlation length and for each half wavelength. [-]"""
+"""Points on the wall per correlation length and per half wavelength. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoughnessFloor(PositionBound):
-    """The covariance of a position by a wall's heights, and what makes it."""
+    """The covariance of a position by a wall's heights, and the position's response to these."""
 
     phase: float  # rms of k h (cosθi + cosθs) at mid-band and at the specular point [rad]
     places: Float[np.ndarray, " places"]  # along the wall, from its centre [m]
@@ -58,19 +59,19 @@ class RoughnessFloor(PositionBound):
 
 
 def roughness_floor(scenario: Scenario, user: str, wall: str) -> RoughnessFloor:
-    """Bound what the roughness of one known plate does to a position found over it.
+    """Bound the error that the roughness of one known plate causes in a position over it.
 
     Parameters
     ----------
     scenario
         In two dimensions.
     user, wall
-        Names of the user and of the plate that it is heard over.
+        Names of the user and of the plate that reflects its pilot.
 
     Raises
     ------
     ValueError
-        If the scene is three-dimensional, or the wall is no rough plate that faces both ends.
+        If the scene is three-dimensional, or the wall is not a rough plate that faces both ends.
     """
     if wall not in scenario.objects:
         known = ", ".join(scenario.objects) or "none"
@@ -111,7 +112,7 @@ def roughness_floor(scenario: Scenario, user: str, wall: str) -> RoughnessFloor:
         length = np.linalg.norm(rough - place, axis=-1) + distance
         kernel = amplitude * cosines * pattern.towards(back / distance[:, None])
         kernel = kernel / np.sqrt(distance) * np.exp(-1j * np.outer(wavenumbers, length))
-        # Relative to the wave of the image, whose gain the fit's own wave takes to be 1.
+        # Relative to the image's wave, whose gain is 1 in the fit.
         reach = np.linalg.norm(image - element)
         wave = np.exp(-1j * wavenumbers * reach) / (2 * wavenumbers * reach)
         kernel *= (wave / (kernel.sum(axis=1) * step))[:, None]
@@ -133,7 +134,7 @@ def _thinned(
     end: Float[np.ndarray, " 3"],
     frequency: float,
 ) -> Float[np.ndarray, "some 3"]:
-    """Keep elements no farther apart than the finest speckle λR/L of a wall of length L."""
+    """Return elements spaced at most by the finest speckle λR/L of a wall of length L."""
     nearest = min(float(np.linalg.norm(positions - place, axis=-1).min()) for place in (start, end))
     speckle = speed_of_light / frequency * nearest / float(np.linalg.norm(end - start))
     reach = float(np.linalg.norm(positions[-1] - positions[0]))
@@ -149,7 +150,10 @@ def _projection(
     positions: Float[np.ndarray, "elements 3"],
     frequencies: Float[np.ndarray, " freqs"],
 ) -> Complex[np.ndarray, "2 elements freqs"]:
-    """Return what, times a change of u, has the change of the fitted position as its real part."""
+    """Return weights; the real part of their product with a change of u is the change of position.
+
+    Derivatives are by both coordinates of the fitted position.
+    """
     waves = spherical_waves(
         user, positions=positions, frequencies=frequencies, planes=[plane], paths=[(0,)]
     )
@@ -174,8 +178,8 @@ def correlation_function(
 ) -> Float[np.ndarray, " n"]:
     """Evaluate the correlation function of a surface's heights; see the scenes' rough surfaces.
 
-    An exponential one is rounded within its inner cut-off, which is left out here: it changes
-    what is much finer than the Fresnel zone. [m²]
+    The inner cut-off of an exponential one is left out: it affects only lengths far below the
+    Fresnel zone. [m²]
     """
     apart = np.abs(distances) / roughness.correlation_length
     shape = np.exp(-(apart**2)) if roughness.spectrum == "gaussian" else np.exp(-apart)

@@ -1,9 +1,9 @@
 """The position error bound of a scenario's user: its specular paths, patterns and materials.
 
-The paths are those of the simulator, to each element by itself over the smooth mean surfaces:
+The paths are those of the simulator, traced to each element over the smooth mean surfaces:
 finite mirrors, occlusion, antenna patterns, Fresnel coefficients at every frequency and the
-coherent loss of roughness. What roughness scatters diffusely is neither signal nor noise here;
-:mod:`validation.bounds.roughness_floor` says what it costs.
+coherent loss of roughness. Diffuse scattering is neither signal nor noise here; its effect is in
+:mod:`validation.bounds.roughness_floor`.
 """
 
 from collections.abc import Mapping
@@ -28,12 +28,12 @@ from validation.bounds.position_bound import Plane, PositionBound, position_erro
 
 @dataclass(frozen=True, kw_only=True)
 class UserWaves:
-    """What the array hears of one user over each sequence of mirrors, without noise."""
+    """Noise-free waves of one user at the array, over each sequence of mirrors."""
 
     paths: tuple[tuple[int, ...], ...]  # mirrors of each, from the array outward
-    waves: Complex[np.ndarray, "paths elements freqs"]  # S-parameters; 0 where not heard [-]
-    planes: tuple[Plane, ...]  # of all mirrors, counted at their centres
-    owners: tuple[str, ...]  # the object that each of them is a face of
+    waves: Complex[np.ndarray, "paths elements freqs"]  # S-parameters; 0 without a path [-]
+    planes: tuple[Plane, ...]  # of all mirrors, with their centres as reference points
+    owners: tuple[str, ...]  # name of the object of each mirror
     positions: Float[np.ndarray, "elements 3"]  # [m]
     frequencies: Float[np.ndarray, " freqs"]  # [Hz]
 
@@ -44,7 +44,7 @@ def user_waves(scenario: Scenario, user: str, *, weakest_db: float = -60.0) -> U
     Parameters
     ----------
     scenario
-        Of one array: antennas that stand by themselves hear no users.
+        With an array: separate receivers do not receive users.
     user
         Its name.
     weakest_db
@@ -102,7 +102,7 @@ def user_waves(scenario: Scenario, user: str, *, weakest_db: float = -60.0) -> U
 
 
 def mirror_planes(mirrors: Mirrors, seen_from: Float[np.ndarray, " 3"]) -> tuple[Plane, ...]:
-    """Return mirrors' planes, counted at their centres, with normals to the side of a place."""
+    """Return mirrors' planes at their centres, with normals to the side of a place."""
     planes = []
     for corners, normal in zip(mirrors.corners, mirrors.normals, strict=True):
         centre = corners.mean(axis=0)
@@ -120,7 +120,7 @@ def scenario_position_bound(
     clock_deviation: float | None = None,
     gains_known: bool = False,
 ) -> PositionBound:
-    """Bound the covariance of a scenario's user, its SNR as the scenarios define it.
+    """Bound the covariance of a scenario's user, with the scenarios' definition of SNR.
 
     Parameters
     ----------
@@ -130,9 +130,9 @@ def scenario_position_bound(
         Mean power of the noise-free samples over the noise's variance; ``None``: the scenario's.
         Infinite is refused: the bound would be 0. [dB]
     wall_covariance
-        Of each object whose place is estimated too, about its centre, as
-        :func:`validation.bounds.position_bound.position_error_bound` orders the entries; of a body
-        of several faces each face has it, independently. What is not named is known exactly.
+        Prior covariance, about its centre, of each object whose position is estimated too, with
+        entries in the order of :func:`validation.bounds.position_bound.position_error_bound`; each
+        face of a body has it, independently. Other objects are known exactly.
     clock_deviation
         Of the user's clock; ``None``: 0 if the scenario's clock is known, else infinite. [s]
     gains_known
@@ -141,7 +141,7 @@ def scenario_position_bound(
     Raises
     ------
     ValueError
-        If there is no such user or path, or nothing fixes the position.
+        If there is no such user or path, or the position is not determined.
     """
     level = scenario.noise.snr_db if snr_db is None else snr_db
     if not np.isfinite(level):
@@ -162,7 +162,7 @@ def scenario_position_bound(
     if any(heard.owners[index] in estimated for index in met):
         covariance = np.zeros((len(met) * dimensions,) * 2)
         for place, index in enumerate(met):
-            # A variance of nothing has no inverse: 1e-12 rad and m are known exactly here.
+            # A variance of 0 has no inverse: 1e-12 rad and m count as exactly known.
             known = 1e-24 * np.eye(dimensions)
             at = slice(place * dimensions, (place + 1) * dimensions)
             covariance[at, at] = estimated.get(heard.owners[index], known)

@@ -1,25 +1,25 @@
-r"""How well a rough wall's own echo can tell its angle and offset, as far as that is closed form.
+r"""Accuracy of a rough wall's angle and offset from its own echo, in closed form.
 
-Assumed: the wall is flat but for Gaussian heights h, so that its focused image is a row of
-:math:`N` resolution cells along it, evenly lit, of independent speckle; each cell tells the
-depth of the wall along its normal with a variance s², independently; and a straight line is
-fitted by least squares, each cell weighted by its intensity. Then at the wall's centre
+Assumptions: the wall is flat except for Gaussian heights h, so that its focused image is a row of
+:math:`N` resolution cells along it, evenly illuminated, with independent speckle; each cell
+measures the wall's depth along its normal with an independent error of variance s²; and a straight
+line is fitted by least squares, each cell weighted by its intensity. Then at the wall's centre
 
 .. math:: \operatorname{var}(\text{angle}) = \frac{12 s^2}{N L^2}, \qquad
           \operatorname{var}(\text{offset}) = \frac{s^2}{N} .
 
-Two things blur a cell's depth. Noise does: with the cell's signal-to-noise ratio after focusing,
-:math:`s_n = c / (4 \pi B_{rms} \sqrt{2\rho}\cos\psi)` at an incidence ψ. And so does roughness,
-however strong the signal: to second order the echo is :math:`q_z H_1 + q_z^2 H_2` with
-:math:`H_1 = j\int h e^{-jq_x x} dx` and :math:`H_2 = -\frac12 \int h^2 e^{-jq_x x} dx`, whose
-ratio turns its phase over :math:`q_z`, as a depth does. Both are sums over many heights, so for a
+A cell's depth has two errors. By noise, with the cell's signal-to-noise ratio :math:`\rho` after
+focusing, :math:`s_n = c / (4 \pi B_{rms} \sqrt{2\rho}\cos\psi)` at an incidence ψ. By roughness, at
+any signal-to-noise ratio: to second order the echo is :math:`q_z H_1 + q_z^2 H_2` with
+:math:`H_1 = j\int h e^{-jq_x x} dx` and :math:`H_2 = -\frac12 \int h^2 e^{-jq_x x} dx`, whose ratio
+gives a phase linear in :math:`q_z`, like a depth. Both are sums over many heights, so for a
 Gaussian correlation function their independent spectra give
 
 .. math:: s_h = \frac12 \sqrt{\frac{S_{h^2}(q_x)}{2 S_h(q_x)}}
               = 2^{-5/4}\, \sigma\, e^{q_x^2 l^2 / 16}, \qquad q_x = 2 k \sin\psi .
 
-A smooth wall (no heights) has no such echo, and no bound here. This is what a fit of the image's
-intensity reaches; it is no Cramér-Rao bound of the heights, which hold the speckle itself.
+A smooth wall (no heights) has no such echo, and no bound here. This is the variance of a fit to the
+image's intensity, not a Cramér-Rao bound: the heights also determine the speckle itself.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ from simulator.scene.radio_scene import scenario_materials
 from validation.bounds.no_bound import NoBound
 
 HALF_POWER = 0.886
-"""Width of a sinc's main lobe at half its power, over its first zero. [-]"""
+"""Half-power width of a sinc's main lobe over the distance of its first zero from the peak. [-]"""
 
 
 def line_covariance(
@@ -49,19 +49,19 @@ def line_covariance(
     cells
         Independent places on it, evenly spread; at least 2. [-]
     depth_deviation
-        Standard deviation of each one's depth. [m]
+        Standard deviation of each cell's depth. [m]
 
     Raises
     ------
     ValueError
-        If there are fewer than two places: they fix no line.
+        If there are fewer than two places, which do not determine a line.
     """
     if cells < 2:
         raise NoBound(
             f"{cells:.2g} resolution cells on a wall of {length:g} m fix no line; "
             "give at least 2: a longer wall or a larger aperture"
         )
-    # N places in the middle of N equal parts: their variance is L²/12 · (1 - 1/N²).
+    # N places at the centres of N equal parts: their variance is L²/12 · (1 - 1/N²).
     variance = depth_deviation**2 / cells
     return np.diag([12 * variance / (length**2 * (1 - cells**-2)), variance])
 
@@ -69,7 +69,7 @@ def line_covariance(
 def speckle_depth_deviation(
     *, rms: float, correlation_length: float, wavelength: float, incidence: float
 ) -> float:
-    """Return by how much roughness itself blurs the depth of one cell.
+    """Return the standard deviation of one cell's depth by roughness. [m].
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def speckle_depth_deviation(
 
 
 def noise_depth_deviation(*, bandwidth: float, snr: float, incidence: float) -> float:
-    """Return by how much noise blurs the depth of one cell, along the normal.
+    """Return the standard deviation of one cell's depth by noise, along the normal. [m].
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def noise_depth_deviation(*, bandwidth: float, snr: float, incidence: float) -> 
 def wall_covariance_bound(
     scenario: Scenario, wall: str, *, snr_db: float | None = None
 ) -> Float[np.ndarray, "2 2"]:
-    """Return what the echo of a scenario's rough plate tells of its line, all other echoes absent.
+    """Return the covariance of a line fitted to the echo of a scenario's rough plate alone.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What claims are made of, how they are run, kept and told.
+"""Claims: their parts, runs, stored results and page.
 
-A claim has our figure, its limit and where that comes from. Planted errors show that figures would
-turn red.
+A claim has our figure, its limit and the limit's origin. Planted errors test that claims fail if
+the code is wrong.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""A claim: what the thesis or theory says, what we measure, and how far apart they may be."""
+"""A claim: the value by the thesis or theory, our measured figure, and its limits."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,16 +14,16 @@ Effort = Literal["quick", "full"]
 class Row:
     """One figure of a claim."""
 
-    name: str  # what was measured, in a few words
-    stated: str  # what the thesis or theory says of it
+    name: str  # short description of the figure
+    stated: str  # value by the thesis or theory
     measured: float
     unit: str = ""  # as it is printed: mm, °, dB; "" for a bare number
     low: float | None = None  # limits in that unit, both inclusive
     high: float | None = None
-    origin: str  # where the limits come from
+    origin: str  # origin of the limits
 
     def __post_init__(self) -> None:
-        """Take NumPy's numbers too; refuse a row that cannot fail."""
+        """Convert NumPy's numbers; refuse a row without limits, which cannot fail."""
         for key in ("measured", "low", "high"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, float(getattr(self, key)))
@@ -40,12 +40,12 @@ class Row:
 
     @property
     def value(self) -> str:
-        """The figure in words."""
+        """The figure as text."""
         return f"{self.measured:.4g} {self.unit}".strip()
 
     @property
     def limits(self) -> str:
-        """The limits in words."""
+        """The limits as text."""
         unit = f" {self.unit}" if self.unit else ""
         if self.low is None:
             return f"≤ {self.high:.4g}{unit}"
@@ -56,7 +56,7 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What was measured for a claim, and how it is drawn."""
+    """Rows measured for a claim, and the function that draws them."""
 
     rows: Sequence[Row]
     draw: Callable[[Figure], None] | None = None
@@ -64,16 +64,16 @@ class Finding:
 
 
 Tell = Callable[[int, int], None]
-"""Told how many steps of how many are done."""
+"""Called with the number of steps done and in all."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """Something that a stranger should not have to believe."""
+    """A statement about the software that anyone can measure again."""
 
-    key: str  # also its file's name
+    key: str  # also the name of its files
     title: str
-    source: str  # the thesis' figure or equation, a paper, a law of physics
+    source: str  # thesis' figure or equation, paper, or law of physics
     measure: Callable[[Effort, Tell], Finding]
-    quick: bool = True  # whether it has a quick form; others run in the full suite only
-    minutes: float = 0.1  # of the full form, about, on two cores
+    quick: bool = True  # whether it has a quick form; otherwise it runs in the full suite only
+    minutes: float = 0.1  # approximate time of the full form on two cores

@@ -1,4 +1,4 @@
-"""Runs claims one after the other; what is done is kept, so that a run can be taken up again."""
+"""Runs claims one after the other, and stores each result, so that a run can be resumed."""
 
 import hashlib
 import json
@@ -19,15 +19,15 @@ OUR_PACKAGES = ("scenes", "simulator", "estimator", "validation")
 
 @dataclass(frozen=True, kw_only=True)
 class ClaimRun:
-    """A claim's figures, just measured or taken from an earlier run of the same code."""
+    """A claim's figures, measured now or reused from an earlier run of the same code."""
 
     claim: Claim
     rows: tuple[Row, ...]
     remarks: tuple[str, ...]
     seconds: float
     picture: str | None  # file name in the run's folder
-    problem: str | None = None  # what it raised instead of figures
-    kept: bool = False  # from an earlier run
+    problem: str | None = None  # error message, if it raised
+    kept: bool = False  # reused from an earlier run
 
     @property
     def passed(self) -> bool:
@@ -36,7 +36,7 @@ class ClaimRun:
 
 
 def claims_digest() -> str:
-    """Return what the figures depend on: our sources and scenes, and the versions of libraries."""
+    """Return a digest of all that figures depend on: sources, scenes, versions of libraries."""
     ours = code_digest(OUR_PACKAGES, (".py", ".toml", ".ply", ".npz"))
     return hashlib.sha256(f"{ours} {package_versions()}".encode()).hexdigest()[:16]
 
@@ -49,25 +49,25 @@ def run_claims(
     fresh: bool = False,
     told: Callable[[Claim], Tell] = lambda claim: lambda done, count: None,
 ) -> Iterator[ClaimRun]:
-    """Measure claims; each one's figures are on disk before the next begins.
+    """Measure claims; each one's figures are on the disk before the next begins.
 
     Parameters
     ----------
     claims
-        In this order.
+        The claims, in order.
     effort
-        Quick forms leave seeds and points out, never a limit.
+        Quick forms have fewer seeds and points, but the same limits.
     folder
-        Gets ``KEY.json`` and ``KEY.png`` of each claim, whole or not at all.
+        Where ``KEY.json`` and ``KEY.png`` of each claim are written, atomically.
     fresh
-        Whether figures that are there already are measured again. Those of other code or of
-        the other effort always are.
+        Whether existing figures are measured again. Those of other code or of the other effort
+        always are.
     told
-        Gives a claim's progress somewhere to go.
+        Returns the progress function of a claim.
 
     Yields
     ------
-    Each claim's figures as they are known. A claim that raises has failed; the others go on.
+    Each claim's figures when measured. A claim that raises has failed; the others continue.
     """
     folder.mkdir(parents=True, exist_ok=True)
     digest = claims_digest()
@@ -85,7 +85,7 @@ def run_claims(
             rows, remarks = tuple(finding.rows), tuple(finding.remarks)
             picture = _drawn(claim, finding, folder)
         except Exception as error:
-            # With its figures, if it is the drawing that failed.
+            # If only the drawing failed, the figures are kept.
             problem = f"{type(error).__name__}: {error}"
         run = ClaimRun(
             claim=claim,
@@ -101,7 +101,7 @@ def run_claims(
 
 
 def run_document(run: ClaimRun) -> dict[str, Any]:
-    """Return a claim's figures as plain JSON; what is not finite becomes null."""
+    """Return a claim's figures as plain JSON; infinite values and NaN become null."""
     rows = [asdict(row) | {"passed": row.passed} for row in run.rows]
     for row in rows:
         if row["measured"] != row["measured"] or abs(row["measured"]) == float("inf"):
@@ -119,7 +119,7 @@ def run_document(run: ClaimRun) -> dict[str, Any]:
 
 
 def rows_of(document: Mapping[str, Any]) -> tuple[Row, ...]:
-    """Read the rows of :func:`run_document` again."""
+    """Read the rows of a document of :func:`run_document`."""
     rows = []
     for row in document["rows"]:
         values = {key: value for key, value in row.items() if key != "passed"}
@@ -130,7 +130,7 @@ def rows_of(document: Mapping[str, Any]) -> tuple[Row, ...]:
 
 
 def write_aside(path: Path, content: str | bytes) -> None:
-    """Write a file aside, then rename it: it is whole or not there."""
+    """Write a temporary file, then rename it, so that it is complete or absent."""
     aside = path.with_name(f".{path.name}.partial")
     aside.write_bytes(content.encode() if isinstance(content, str) else content)
     os.replace(aside, path)
@@ -157,7 +157,7 @@ def _kept(claim: Claim, folder: Path, digest: str, effort: Effort) -> ClaimRun |
             kept=True,
         )
     except (OSError, ValueError, KeyError, TypeError):
-        return None  # nothing there, or not ours: measure it
+        return None  # absent, or not readable: measure again
 
 
 def _drawn(claim: Claim, finding: Finding, folder: Path) -> str | None:

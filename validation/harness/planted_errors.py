@@ -1,8 +1,8 @@
-"""Errors planted in simulator and estimator: each must turn a figure of the claims red.
+"""Errors planted in simulator and estimator (mutation tests): each must make a claim fail.
 
-``python -m validation.harness.planted_errors [NAME…]`` copies the packages aside, changes one line
-of the copy, runs ``mmslam validate --quick`` there on the claims that have to do with it, and lists
-the figures that fail. An error that goes unnoticed is a gap in the claims.
+``python -m validation.harness.planted_errors [NAME…]`` copies the packages, changes one line of the
+copy, runs ``mmslam validate --quick`` there on the related claims, and lists the figures that fail.
+An error without a failing figure is a gap in the claims.
 """
 
 import json
@@ -19,13 +19,13 @@ PACKAGES = ("scenes", "simulator", "estimator", "validation", "mmslam")
 
 @dataclass(frozen=True, kw_only=True)
 class PlantedError:
-    """One line of the sources made wrong."""
+    """A wrong replacement of one line of the sources."""
 
     name: str
     file: str
     right: str  # found exactly once in the file
     wrong: str
-    claims: tuple[str, ...]  # that are run: those close to it
+    claims: tuple[str, ...]  # to be run: those related to it
 
 
 PLANTED = (
@@ -61,7 +61,7 @@ PLANTED = (
         name="image plane 1 mm off in the estimator",
         file="estimator/geometry/wall_2d.py",
         right="((points - start) @ normal)[..., None] * normal",
-        # Directions are mirrored about the origin: they are left alone.
+        # Directions are mirrored about the origin, and stay unchanged.
         wrong="((points - start) @ normal + 1e-3 * bool(np.any(start)))[..., None] * normal",
         claims=("fig04_09_slam",),
     ),
@@ -127,24 +127,24 @@ PLANTED = (
 
 @dataclass(frozen=True, kw_only=True)
 class Noticed:
-    """What a planted error turned red."""
+    """Claims that failed by a planted error."""
 
     error: PlantedError
-    red: tuple[str, ...]  # "claim: figure", or what could not be measured
+    red: tuple[str, ...]  # "claim: figure", or the claim that raised
 
     @property
     def passed(self) -> bool:
-        """Whether it was noticed at all."""
+        """Whether at least one figure failed."""
         return bool(self.red)
 
 
 def plant(error: PlantedError, folder: Path) -> None:
-    """Copy the packages to a folder and make one line wrong there.
+    """Copy the packages to a folder and replace one line there.
 
     Raises
     ------
     ValueError
-        If the line is not there exactly once: the list of errors is out of date.
+        If the line does not occur exactly once: the list of errors is out of date.
     """
     for package in PACKAGES:
         source = Path(str(files(package)))
@@ -160,7 +160,7 @@ def plant(error: PlantedError, folder: Path) -> None:
 
 
 def noticed(error: PlantedError) -> Noticed:
-    """Run the claims on sources with an error, and collect what fails.
+    """Run the claims on sources with an error, and collect the failures.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def noticed(error: PlantedError) -> Noticed:
     return Noticed(error=error, red=tuple(red))
 
 
-# The copy is imported in place of the packages that are installed.
+# The copy is imported in place of the installed packages.
 _START = (
     "import sys; sys.path.insert(0, sys.argv.pop(1)); "
     "import mmslam.cli; mmslam.cli.app(prog_name='mmslam')"
@@ -195,7 +195,7 @@ _START = (
 
 
 def main(arguments: list[str]) -> int:
-    """Plant the errors whose names hold one of the arguments, or all; 1 if one goes unnoticed."""
+    """Plant the errors whose names contain an argument, or all; return 1 if one is not noticed."""
     chosen = [e for e in PLANTED if not arguments or any(a in e.name for a in arguments)]
     missed = 0
     for error in chosen:

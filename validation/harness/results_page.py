@@ -1,8 +1,8 @@
-"""The page of results: made from runs, so that it says what was measured and nothing else.
+"""The page of results in the documentation, generated from runs of the claims.
 
 A folder of the documentation keeps the figures of the last full and the last quick run
 (``full.json``, ``quick.json``), and the page and its pictures made from them. Continuous
-integration measures the quick ones again and compares: a stated figure that no longer holds fails.
+integration repeats the quick ones and compares: it fails if a stated figure has changed.
 """
 
 import json
@@ -16,7 +16,7 @@ from validation.harness.claim_runs import rows_of, write_aside
 
 PAGE = "index.md"
 FORMS: tuple[Effort, ...] = ("quick", "full")
-"""The full one last: where both were measured, the page shows it."""
+"""Forms of claims; the page shows the last one that was measured."""
 
 HEAD = """# Results
 
@@ -27,23 +27,23 @@ Continuous integration measures the quick forms again and fails if one of their 
 """
 
 DRIFT = 0.05
-"""How far a figure may have moved, over the larger of itself and its limits: other processors
-round otherwise, and a figure far below its limit is nothing but rounding. [-]"""
+"""Largest change of a figure, relative to the larger of itself and its limits: other processors
+round differently, and a figure far below its limit may consist of rounding only. [-]"""
 
 Document = Mapping[str, Any]
 
 
 def record_results(document: Document, folder: Path, run_folder: Path) -> None:
-    """Keep a run's figures and pictures, and make the page anew.
+    """Store a run's figures and pictures, and generate the page.
 
     Parameters
     ----------
     document
         Of a run of all claims.
     folder
-        Of the documentation; it may hold the other form's run.
+        In the documentation; it may hold the other form's run.
     run_folder
-        Where the run wrote its pictures.
+        With the run's pictures.
     """
     folder.mkdir(parents=True, exist_ok=True)
     effort = document["effort"]
@@ -62,7 +62,7 @@ def record_results(document: Document, folder: Path, run_folder: Path) -> None:
 
 
 def recorded_page(folder: Path) -> str:
-    """Make the page from what a folder keeps: the full form of each claim if there is one."""
+    """Generate the page from the stored runs: the full form of each claim if there is one."""
     kept = {effort: read_record(folder, effort) for effort in FORMS}
     chosen: dict[str, tuple[Effort, Mapping[str, Any]]] = {}
     for effort in FORMS:
@@ -74,7 +74,7 @@ def recorded_page(folder: Path) -> str:
 
 
 def read_record(folder: Path, effort: str) -> Document | None:
-    """Read the figures that a folder keeps of a form, None if there are none."""
+    """Read the stored figures of a form, None if there are none."""
     file = folder / f"{effort}.json"
     if not file.is_file():
         return None
@@ -83,9 +83,9 @@ def read_record(folder: Path, effort: str) -> Document | None:
 
 
 def drifted(now: Document, stated: Document) -> list[str]:
-    """Find stated figures that no longer hold, a line for each.
+    """Return a line for each stated figure that has changed.
 
-    A figure that is stated and was not measured is one, too; claims that were not run are not.
+    A stated figure that was not measured counts as changed, unless its claim was not run.
     """
     found = []
     measured = {claim["key"]: {row.name: row for row in rows_of(claim)} for claim in now["claims"]}
@@ -114,7 +114,7 @@ def _same(stated: Row, again: Row) -> bool:
 
 
 def _sources(kept: Mapping[Effort, Document | None]) -> str:
-    """Name the sources that were measured; a form that is behind the other is not hidden."""
+    """Return the sources' versions of both forms, also if they differ."""
     codes = {effort: document["code"] for effort, document in kept.items() if document is not None}
     told = ", ".join(f"{effort} forms by sources `{code}`" for effort, code in codes.items())
     if len(set(codes.values())) > 1:

@@ -1,4 +1,4 @@
-"""Prints what an experiment measured beside its limits, and refuses what falls outside."""
+"""Table of an experiment's figures with their limits; raises if one is outside."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,14 +10,14 @@ from validation.harness.claim import Row
 
 
 def row_line(row: Row) -> str:
-    """Describe one figure in a line."""
+    """Return the line of one figure."""
     unit = f" {row.unit}" if row.unit else ""
     verdict = "holds" if row.passed else "FAILS"
     return f"{verdict}: {row.name}: {row.measured:.4g}{unit} ({row.stated}; {row.limits})"
 
 
 def conclude(rows: Sequence[Row]) -> None:
-    """Print all figures.
+    """Print all figures, and check them.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def conclude_with_figure(
     size
         Width and height of the figure. [inch]
     draw
-        Draws into it.
+        Function that draws into the figure.
     rows
         See :func:`conclude`.
     """

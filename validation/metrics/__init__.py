@@ -1,7 +1,7 @@
-"""How far an estimate is from the truth, and whether its stated uncertainty is honest.
+"""Errors of estimates against the truth, and the calibration of their stated uncertainty.
 
-The truth is read here, after the estimate was made. Errors of users, walls and targets; coverage of
-covariances; quality of images.
+The truth is read only here, after the estimate was made. Errors of users, walls and targets;
+coverage of covariances; quality of images.
 """
 
 import lazy_loader

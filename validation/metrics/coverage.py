@@ -1,4 +1,4 @@
-r"""Whether stated covariances are those of the errors.
+r"""Agreement of stated covariances with actual errors.
 
 An error e of n coordinates with a true covariance C has a normalised square (NEES)
 :math:`e^T C^{-1} e` that is χ² distributed with n degrees of freedom: its mean is n, and the
@@ -18,9 +18,9 @@ from estimator.results.estimate import UserEstimate
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
-    """How often regions of a probability held the truth, with what the number of trials allows."""
+    """Share of trials whose confidence region held the truth, with its own confidence interval."""
 
-    probability: float  # that the regions were stated for [-]
+    probability: float  # nominal, of the regions [-]
     share: float  # of the trials whose region held the truth [-]
     low: float  # of the confidence interval of the true share [-]
     high: float
@@ -28,13 +28,13 @@ class Coverage:
 
     @property
     def consistent(self) -> bool:
-        """Whether the stated probability is one that the trials do not contradict."""
+        """Whether the nominal probability lies in the interval."""
         return self.low <= self.probability <= self.high
 
 
 @dataclass(frozen=True, kw_only=True)
 class Consistency:
-    """Mean of the normalised squares, and the interval it must lie in."""
+    """Mean of the normalised squares, and the interval for calibrated covariances."""
 
     mean: float  # [-]
     expected: float  # the number of coordinates [-]
@@ -44,7 +44,7 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether the mean is one that calibrated covariances give."""
+        """Whether the mean lies in the interval for calibrated covariances."""
         return self.low <= self.mean <= self.high
 
 
@@ -87,12 +87,12 @@ def coverage(
     axes
         Number of coordinates.
     confidence
-        Of the binomial interval (Clopper and Pearson's, which never promises too much).
+        Of the binomial interval (Clopper and Pearson's, which is conservative).
 
     Raises
     ------
     ValueError
-        If there are no trials, or a probability is none.
+        If there are no trials, or a probability is not between 0 and 1.
     """
     values = np.asarray(squares, dtype=np.float64)
     _check(values.size, probability=probability, confidence=confidence)
@@ -124,7 +124,7 @@ def consistency(
     Raises
     ------
     ValueError
-        If there are no trials, or the confidence is no probability.
+        If there are no trials, or the confidence is not between 0 and 1.
     """
     values = np.asarray(squares, dtype=np.float64)
     _check(values.size, probability=0.5, confidence=confidence)
@@ -151,7 +151,7 @@ def position_errors(
 ) -> tuple[float | None, float | None]:
     """Return the error of a position in the plane [m], and its square over its covariance [-].
 
-    Both are ``None`` of an answer without a position or without its covariance.
+    Both are ``None`` for an estimate without a position or without its covariance.
     """
     if answer.position is None or answer.covariance is None:
         return None, None

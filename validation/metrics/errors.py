@@ -1,4 +1,4 @@
-"""How far an estimate is from the truth: users in metres, walls by angle, offset and extent."""
+"""Errors of estimates: of users in metres, of walls by angle, offset and extent."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from validation.metrics.truth import Truth
 
 @dataclass(frozen=True, kw_only=True)
 class WallError:
-    """An estimated mirror beside the true wall nearest to it."""
+    """An estimated mirror compared with the true wall nearest to it."""
 
     wall: str
     angle: float  # between the two planes, unsigned [rad]
@@ -38,13 +38,13 @@ def wall_error(
 ) -> WallError:
     """Compare an estimated mirror with a true wall from ``start`` to ``end``.
 
-    The offset is taken at the true wall's centre, so an error of the angle does not count
-    in it twice.
+    The offset is taken at the true wall's centre, so that it does not include the error of the
+    angle.
     """
     length = float(np.linalg.norm(end - start))
     direction = (end - start) / length
     found = mirror.end - mirror.start
-    # atan2 of sine and cosine: arccos alone resolves no angle below 1e-8 rad.
+    # atan2 of sine and cosine: arccos alone does not resolve angles below 1e-8 rad.
     sine = np.linalg.norm(np.cross(direction, found))
     angle = float(np.arctan2(sine, abs(direction @ found)))
     offset = float(mirror.normal @ ((start + end) / 2 - mirror.start))
@@ -60,10 +60,10 @@ def wall_error(
 
 
 def nearest_wall(mirror: Mirror, truth: Truth) -> str | None:
-    """Name the true wall that an estimated mirror lies nearest to, None if none is known.
+    """Return the name of the true wall nearest to an estimated mirror, None without walls.
 
-    Nearest by the mean distance of the mirror's ends and centre from the wall's segment,
-    so that a wall crossed at a right angle does not win.
+    The distance is the mean over the mirror's ends and centre from the wall's segment, so that
+    a wall crossed at a right angle is not the nearest.
     """
     names = [name for name in truth.wall_start if name in truth.wall_end]
     if not names:
@@ -101,52 +101,52 @@ def distances_from_segment(
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorSummary:
-    """Position errors of many trials; those without an answer count as infinitely wrong."""
+    """Position errors of many trials; those without a position have an infinite error."""
 
-    errors: Float[np.ndarray, " found"]  # of the answers, in ascending order [m]
-    trials: int  # in all, with those that gave no answer [-]
+    errors: Float[np.ndarray, " found"]  # of the positions found, in ascending order [m]
+    trials: int  # in all, with those without a position [-]
 
     @property
     def missing(self) -> int:
-        """Trials without an answer."""
+        """Number of trials without a position."""
         return self.trials - len(self.errors)
 
     @property
     def median(self) -> float:
-        """Error that half of all trials keep within. [m]."""
+        """Error not exceeded in half of all trials. [m]."""
         return self.within(0.5)
 
     @property
     def ninth_decile(self) -> float:
-        """Error that 90 % of all trials keep within. [m]."""
+        """Error not exceeded in 90 % of all trials. [m]."""
         return self.within(0.9)
 
     @property
     def worst(self) -> float:
-        """Error that all trials keep within. [m]."""
+        """Error not exceeded in any trial. [m]."""
         return self.within(1.0)
 
     @property
     def rms(self) -> float:
-        """Root of the mean square of the answers' errors alone; NaN without any. [m]."""
+        """Root mean square of the errors of positions found; NaN without any. [m]."""
         return float(np.sqrt(np.mean(self.errors**2))) if self.errors.size else float("nan")
 
     def within(self, share: float) -> float:
-        """Return the least error that a share of all trials keeps within; inf if none does. [m].
+        """Return the least error not exceeded in a share of all trials; inf if there is none. [m].
 
-        The smallest of the errors whose rank is at least that share: a value that occurred.
+        It is the smallest of the errors whose rank is at least that share, without interpolation.
         """
         rank = max(int(np.ceil(share * self.trials - 1e-9)), 1)
         return float(self.errors[rank - 1]) if rank <= len(self.errors) else float("inf")
 
     def cdf(self, limits: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-        """Return the share of all trials that err by no more than each limit. [-]."""
+        """Return the share of all trials whose error does not exceed each limit. [-]."""
         counts = np.searchsorted(self.errors, limits, side="right")
         return np.asarray(counts / self.trials)
 
 
 def error_summary(errors: Sequence[float | None]) -> ErrorSummary:
-    """Sum up the position errors of trials; ``None`` is a trial without an answer.
+    """Summarise the position errors of trials; ``None`` is a trial without a position.
 
     Raises
     ------

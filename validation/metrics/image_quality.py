@@ -1,8 +1,8 @@
-r"""How well an image is focused: entropy, and peak and integrated sidelobe ratios.
+r"""Focus quality of an image: entropy, and peak and integrated sidelobe ratios.
 
 With the intensity :math:`p = |I|^2 / \sum |I|^2` of each pixel the entropy is
 :math:`-\sum p \ln p`: 0 if all is in one pixel, ln N if it is spread evenly over N; its
-exponential is the number of pixels that hold the image. Focusing lowers it.
+exponential is an effective number of pixels. Focusing lowers it.
 
 Sidelobe ratios are those of one point's response: of the highest intensity, and of all energy,
 outside of the main lobe over that inside. For a rectangular aperture the peak ratio is -13.26 dB,
@@ -19,7 +19,7 @@ from estimator.results.estimate import Image
 
 @dataclass(frozen=True, kw_only=True)
 class SidelobeRatios:
-    """Sidelobes over the main lobe."""
+    """Levels of sidelobes relative to the main lobe."""
 
     peak_db: float  # highest intensity outside over that inside [dB]
     integrated_db: float  # energy outside over that inside [dB]
@@ -31,7 +31,7 @@ def image_entropy(values: Complex[np.ndarray, "*grid"]) -> float:
     Raises
     ------
     ValueError
-        If the image is empty: it has no entropy.
+        If the image has no energy.
     """
     intensity = np.abs(values) ** 2
     total = float(intensity.sum())
@@ -44,19 +44,19 @@ def image_entropy(values: Complex[np.ndarray, "*grid"]) -> float:
 def sidelobe_ratios(
     values: Complex[np.ndarray, "*grid"], main_lobe: Bool[np.ndarray, "*grid"]
 ) -> SidelobeRatios:
-    """Compare what is outside of a main lobe with what is inside.
+    """Compare the intensity outside of a main lobe with that inside.
 
     Parameters
     ----------
     values
-        Image, or cut through it, of one point; pixels count alike.
+        Image of one point, or cut through it; all pixels have the same weight.
     main_lobe
         Which pixels belong to the main lobe, out to its first zeros.
 
     Raises
     ------
     ValueError
-        If the main lobe holds no energy, or leaves no pixel beside it.
+        If the main lobe holds no energy, or includes all pixels.
     """
     intensity = np.abs(values) ** 2
     inside, outside = intensity[main_lobe], intensity[~main_lobe]
@@ -79,14 +79,14 @@ def main_lobe(
     axes: Float[np.ndarray, "axes 3"],
     half_widths: Float[np.ndarray, " axes"],
 ) -> Bool[np.ndarray, "*grid"]:
-    """Choose the pixels of a main lobe: a box (of two axes in a plane) around a peak.
+    """Return the pixels of a main lobe: a box (of two axes in a plane) around a peak.
 
     Parameters
     ----------
     image
-        Holds the peak.
+        With the peak.
     peak
-        Where it is. [m]
+        Its position. [m]
     axes
         Unit vectors along range and across it.
     half_widths

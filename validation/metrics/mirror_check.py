@@ -1,4 +1,4 @@
-"""Whether mirrors that are reported are walls: each beside the true wall that it lies on."""
+"""Comparison of reported mirrors with the true walls on which they lie."""
 
 from dataclasses import dataclass
 
@@ -11,19 +11,20 @@ from validation.metrics.errors import distances_from_segment, nearest_wall, wall
 from validation.metrics.truth import Truth
 
 ON_WALL = 0.01
-"""Distance from a wall within which a place is on it: a cell λ/2D at 1 m. [m]"""
+"""Distance from a wall within which a point counts as on it: a cell λ/2D at 1 m. [m]"""
 SHARE_ON_WALL = 0.8
-"""Share of a mirror that must be on true walls: its ends are known to some cells only. [-]"""
+"""Share of a mirror that must be on true walls: the error of its ends is some cells. [-]"""
 TURNED = np.radians(1.0)
 """Angle from a wall beyond which a mirror may be false: at 0.5 m it moves a user by 2 cm. [rad]"""
 DEVIATIONS = float(norm.isf(0.0005))
-"""Deviations of its angle that a mirror must be turned by as well: outside its 99.9 % interval. A
-wall of some 20 cells, such as the one of 7 cm, is known to 1° only, and says so. [-]"""
+"""Error of the angle, in stated standard deviations, that a false mirror must exceed as well:
+outside the 99.9 % interval. The stated deviation of a wall of some 20 cells, such as one of 7 cm,
+is 1°. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeenMirror:
-    """A mirror that was reported, beside the truth."""
+    """A reported mirror compared with the truth."""
 
     wall: str | None  # the true wall it lies on; None: it is false
     angle: float  # from the true wall's [rad]
@@ -32,7 +33,7 @@ class SeenMirror:
 
 
 def seen_mirrors(estimate: Estimate, truth: Truth) -> tuple[SeenMirror, ...]:
-    """Compare all mirrors that were reported with the true walls."""
+    """Compare all reported mirrors with the true walls."""
     return tuple(_seen(mirror, truth) for mirror in estimate.mirrors)
 
 

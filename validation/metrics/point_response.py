@@ -1,4 +1,4 @@
-"""The response to one point along a line: where it peaks, and its -3 dB width."""
+"""The response to one point along a line: position of its peak and -3 dB width."""
 
 from dataclasses import dataclass
 
@@ -21,14 +21,14 @@ def peak_cut(
     """Measure the highest lobe of a finely sampled magnitude.
 
     The peak is the vertex of a parabola through the power of three samples, the -3 dB points are
-    interpolated linearly in power: with 20 samples in the width both err by less than 1e-3 of it.
+    interpolated linearly in power: with 20 samples in the width both errors are below 1e-3 of it.
 
     Parameters
     ----------
     coordinate
         Along the line, in equal steps.
     magnitude
-        Of an image or map there. [-]
+        Of an image or map at these points. [-]
 
     Raises
     ------

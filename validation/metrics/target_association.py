@@ -1,4 +1,4 @@
-r"""Estimated against true points: which belong together, which are missed, which are false.
+r"""Association of estimated with true points: pairs, missed and false ones.
 
 The optimal subpattern assignment (OSPA) metric of order p and cut-off c [1]_,
 
@@ -26,15 +26,15 @@ from validation.metrics.truth import Truth, front_face
 
 @dataclass(frozen=True, kw_only=True)
 class Association:
-    """Pairs within the cut-off, and what is left over."""
+    """Pairs within the cut-off, and unpaired points."""
 
     pairs: tuple[tuple[int, int], ...]  # (estimate, truth), nearest first
     distances: Float[np.ndarray, " pairs"]  # of these pairs [m]
     missed: tuple[int, ...]  # truths without an estimate
     false: tuple[int, ...]  # estimates without a truth
     ospa: float  # metric of both sets; 0 if both are empty [m]
-    localization: float  # the share of it by distances within the cut-off [m]
-    cardinality: float  # and by what is missed, false or farther [m]
+    localization: float  # part of the metric by distances within the cut-off [m]
+    cardinality: float  # part by missed, false or more distant points [m]
 
 
 def associate(
@@ -51,7 +51,7 @@ def associate(
     estimates, truths
         Points. [m]
     cutoff
-        Farther apart, two points are not the same; a miss costs as much. [m]
+        Largest distance of a pair, and the cost of an unpaired point. [m]
     order
         The metric's p, 1 or more. [-]
 
@@ -107,7 +107,7 @@ def associate_distances(
 
 @dataclass(frozen=True, kw_only=True)
 class TargetComparison:
-    """An estimate's targets beside the true ones, by name."""
+    """An estimate's targets compared with the true ones, by name."""
 
     names: tuple[str | None, ...]  # of the true target of each estimated one; None: false
     errors: tuple[float | None, ...]  # from the nearest point of its front face [m]
@@ -124,16 +124,16 @@ def compare_targets(
     cutoff: float,
     order: float = 2.0,
 ) -> TargetComparison:
-    """Compare estimated targets with the true ones, where an image shows those: their front face.
+    """Compare estimated targets with the true ones' front faces, where images show them.
 
     Parameters
     ----------
     targets
-        Estimated ones.
+        The estimated targets.
     truth
-        Knows the true ones.
+        With the true targets.
     mirrors
-        Estimated, that targets are seen through: from the aperture's image in them.
+        Estimated mirrors; targets seen through them face the aperture's image.
     aperture
         Centre of the array. [m]
     cutoff, order

@@ -1,4 +1,4 @@
-"""The truth beside a measurement: read for comparisons only, never for an estimate."""
+"""The ground truth stored with a measurement: read for comparisons only, never by the estimator."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ Points = dict[str, Float[np.ndarray, " 3"]]
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """Where things really are, by name; empty where nothing is known."""
+    """True positions of users, walls and targets, by name; empty if unknown."""
 
     user_position: Points = field(default_factory=dict)  # [m]
     wall_start: Points = field(default_factory=dict)  # [m]
@@ -31,20 +31,20 @@ class Truth:
 def front_face(
     truth: Truth, target: str, seen_from: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, " 3"]:
-    """Return the point of a target's surface that is nearest to where it is seen from.
+    """Return the point of a target's surface that is nearest to the aperture.
 
-    There an image shows the target: a post at its centre plus its radius toward the aperture.
-    Seen by way of a mirror, ``seen_from`` is the aperture's image.
+    An image shows the target there: a post at its centre plus its radius toward the aperture. For a
+    target seen over a mirror, ``seen_from`` is the aperture's image.
 
     Parameters
     ----------
     truth
-        What knows the target.
+        With the target.
     target
-        Its name in ``target_position``. Of a mesh, its bounding box counts; a target of
+        Its name in ``target_position``. A mesh is represented by its bounding box; a target of
         unknown size is a point.
     seen_from
-        Outside of the target. [m]
+        A point outside of the target. [m]
 
     Raises
     ------
@@ -68,7 +68,7 @@ def front_face(
 
 
 def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
-    """Take the truth out of the layout ``user_position`` (user, axis), ``wall_start`` (wall, axis).
+    """Read the truth from the layout ``user_position`` (user, axis), ``wall_start`` (wall, axis).
 
     Targets are ``target_position`` and ``target_size`` (target, axis), ``target_angle`` and
     ``target_kind`` (target).
@@ -76,7 +76,7 @@ def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
     Parameters
     ----------
     dataset
-        The group ``truth`` of a measurement store; what it lacks stays unknown.
+        The group ``truth`` of a measurement store; absent variables are unknown.
 
     Raises
     ------
@@ -105,9 +105,9 @@ def truth_from_dataset(dataset: xr.Dataset | None) -> Truth:
 
 
 def read_truth(path: Path, *, sample: int | None = None) -> Truth:
-    """Read where things really are from a measurement store, as :func:`read_truth_dataset` does."""
+    """Read the true positions from a measurement store, as :func:`read_truth_dataset` does."""
     found = read_truth_dataset(path, sample=sample)
-    with damage_told(Path(path) / TRUTH):  # values of a kind that no truth has
+    with damage_told(Path(path) / TRUTH):  # values of an unexpected type
         return truth_from_dataset(found)
 
 
@@ -119,11 +119,11 @@ def read_truth_dataset(path: Path, *, sample: int | None = None) -> xr.Dataset |
     path
         The store's folder.
     sample
-        Which one, if the truth has a leading ``sample`` dimension.
+        Number of the sample, if the truth has a leading ``sample`` dimension.
 
     Returns
     -------
-    All that is known, its paths included; None if the store holds no truth.
+    The truth with its paths; None if the store holds none.
 
     Raises
     ------
