@@ -9,6 +9,7 @@ from jaxtyping import Complex, Float
 
 from simulator.antennas.beam_culling import AntennaGroup, in_reach
 from simulator.antennas.links import Links
+from simulator.antennas.polarization import Polarization
 from simulator.materials.slab_insertion import (
     LEAST_LEVEL,
     Crossing,
@@ -20,9 +21,6 @@ from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.visibility.shaft_culling import Sightlines, object_shape, scenario_obstacles
 from simulator.visibility.slab_sights import SlabSights
-
-PAIRS_AT_ONCE = 200_000
-"""Links times patches whose slabs' coefficients are worked out in one go. [-]"""
 
 
 def scattered_in_space(
@@ -91,7 +89,7 @@ def scattered_in_space(
 
 @dataclass(frozen=True)
 class _Insertion:
-    """What slabs on either leg multiply to the sum over a patch, at its centre."""
+    """Factor of the slabs on both legs in the sum over a patch, taken at the patch's centre."""
 
     out: tuple[Crossing, ...]
     back: tuple[Crossing, ...]
@@ -102,20 +100,25 @@ class _Insertion:
         centres: Float[np.ndarray, "patches 3"],
         nodes: Float[np.ndarray, " nodes"],
     ) -> Complex[np.ndarray, "patches links nodes"]:
-        total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
-        for slabs, places, polarization in (
-            (self.out, links.senders, links.sent.polarization),
-            (self.back, links.receivers, links.received.polarization),
-        ):
-            at_once = max(1, PAIRS_AT_ONCE // max(1, len(centres)))
-            for first in range(0, len(places) if slabs else 0, at_once):
-                some = slice(first, first + at_once)
-                towards = (centres[:, None] - places[some]).reshape(-1, 3)
-                lengths = np.sqrt(np.einsum("rx,rx->r", towards, towards))
-                ways = towards / lengths[:, None]
-                inserted = along_field(slabs, ways, lengths, nodes, polarization.field(ways))
-                total[:, some] *= inserted.reshape(len(centres), -1, nodes.size)
-        return total
+        out, back = (
+            partial(_transmitted, slabs, centres, nodes) if slabs else None
+            for slabs in (self.out, self.back)
+        )
+        return links.product_over_legs(out, back, patches=len(centres), nodes=nodes.size)
+
+
+def _transmitted(
+    slabs: tuple[Crossing, ...],
+    centres: Float[np.ndarray, "patches 3"],
+    nodes: Float[np.ndarray, " nodes"],
+    places: Float[np.ndarray, "some 3"],
+    polarization: Polarization,
+) -> Complex[np.ndarray, "patches some nodes"]:
+    towards = (centres[:, None] - places).reshape(-1, 3)
+    lengths = np.sqrt(np.einsum("rx,rx->r", towards, towards))
+    ways = towards / lengths[:, None]
+    inserted = along_field(slabs, ways, lengths, nodes, polarization.field(ways))
+    return inserted.reshape(len(centres), -1, nodes.size)
 
 
 def _own_faces(scene: RadioScene, name: str) -> int:

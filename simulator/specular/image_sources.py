@@ -8,6 +8,7 @@ restricted by the mirrors' finite extents and by occlusion.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -16,15 +17,13 @@ from scenes.schema.errors import ScenarioError
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.beam_culling import LEVEL, AntennaGroup
 from simulator.antennas.links import Links
+from simulator.antennas.polarization import Polarization
 from simulator.geometry.mirrors import Mirrors
 from simulator.specular.image_method import unfolded_chain
 from simulator.specular.path_field import Through, reflected_field
 
 MOST_LEGS = 10_000
 """Most legs over mirrors: tracing one from every antenna takes some 10 ms; minutes in all. [-]"""
-
-PAIRS_AT_ONCE = 100_000
-"""Links times patches whose reflection is computed in one batch. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,24 +146,30 @@ class LegReflection:
         nodes: Float[np.ndarray, " nodes"],
     ) -> Complex[np.ndarray, "patches links nodes"]:
         """Return the factor for links between images. [-]."""
-        total = np.ones((len(centres), len(links.receivers), nodes.size), dtype=np.complex128)
-        for leg, places, image, through in (
-            (self.out, links.senders, links.sent.polarization, self.through[0]),
-            (self.back, links.receivers, links.received.polarization, self.through[1]),
-        ):
-            at_once = max(1, PAIRS_AT_ONCE // len(centres))
-            for first in range(0, len(places) if leg.sequence or any(through) else 0, at_once):
-                some = slice(first, first + at_once)
-                chain = unfolded_chain(self.mirrors, leg.sequence, places[some], centres)
-                field = reflected_field(
-                    self.mirrors,
-                    chain,
-                    nodes,
-                    sent=image.turned(leg.turn.T),
-                    at_place=image,
-                    through=through,
-                )
-                total[:, some] *= np.moveaxis(
-                    field.reshape(len(places[some]), len(centres), -1), 0, 1
-                )
-        return total
+        out, back = (
+            partial(self._over, leg, through, centres, nodes)
+            if leg.sequence or any(through)
+            else None
+            for leg, through in zip((self.out, self.back), self.through, strict=True)
+        )
+        return links.product_over_legs(out, back, patches=len(centres), nodes=nodes.size)
+
+    def _over(
+        self,
+        leg: Leg,
+        through: Through,
+        centres: Float[np.ndarray, "patches 3"],
+        nodes: Float[np.ndarray, " nodes"],
+        places: Float[np.ndarray, "some 3"],
+        image: Polarization,
+    ) -> Complex[np.ndarray, "patches some nodes"]:
+        chain = unfolded_chain(self.mirrors, leg.sequence, places, centres)
+        field = reflected_field(
+            self.mirrors,
+            chain,
+            nodes,
+            sent=image.turned(leg.turn.T),
+            at_place=image,
+            through=through,
+        )
+        return np.moveaxis(field.reshape(len(places), len(centres), -1), 0, 1)
