@@ -1,7 +1,7 @@
-"""How good it is: estimates against the truth, the simulator against theory and full wave.
+"""Validation: estimates against the truth, the simulator against theory and full wave.
 
-Only this package and the front door see both truth and estimate. A claim (``claims``) states a
-figure, its limit and where that comes from; experiments, bounds and closed forms measure it.
+Only this package and the front door use both truth and estimate. A claim (``claims``) states a
+figure, its limit and the limit's origin; experiments, bounds and closed forms measure it.
 """
 
 import lazy_loader

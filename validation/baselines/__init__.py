@@ -1,6 +1,6 @@
-"""What else locates a user, after the thesis' introduction: one method a file, on our scenes.
+"""Other localization methods of the thesis' introduction, one per module, on our scenes.
 
-Each takes the same measurement as our estimator, with what it needs beyond it stated.
+Each gets the same measurement as our estimator, and states its additional inputs.
 """
 
 import lazy_loader

@@ -1,11 +1,11 @@
-"""Differences of angles of arrival (ADoA) of several access points, heard by the user.
+"""Differences of angles of arrival (ADoA) of several access points, measured by the user.
 
-Stands for map-less mmWave positioning by angle differences (Palacios, Casari, Widmer, "JADE",
+Represents map-less mmWave positioning by angle differences (Palacios, Casari, Widmer, "JADE",
 INFOCOM 2017). Beyond ours it needs three more access points (at
 :data:`validation.baselines.room.ANCHORS`) and an array of 64 elements at the user, whose
-orientation is unknown: so that only differences of angles count. It needs no clock and no ranging.
-It assumes that the strongest path of each access point is the direct one, and that all stand on
-the side that the user's array faces.
+orientation is unknown, so that only differences of angles are used. It needs no clock and no
+ranging. It assumes that the strongest path of each access point is the direct one, and that all are
+on the side that the user's array faces.
 """
 
 import numpy as np
@@ -17,15 +17,15 @@ from validation.baselines.multilateration import CONVERGED, REACH, STARTS
 from validation.baselines.room import ANCHORS, Fix, Room
 
 ELEMENTS = 64
-"""Antennas of the user's array: a beam of 1.6°, half a wavelength apart. Chosen, as the method
-names none for our band. [-]"""
+"""Antennas of the user's array: a beam of 1.6° at a spacing of half a wavelength. Chosen: the
+publication states none for our band. [-]"""
 POINTS = 51
-"""Frequencies that the angles are averaged over: of our band. [-]"""
+"""Frequencies in our band over which the angles are averaged. [-]"""
 TURN = np.radians(7.0)
-"""By which the user's array is turned, unknown to the method. [rad]"""
+"""Rotation of the user's array, unknown to the method. [rad]"""
 ASIDE = 1e-3
-"""By which starts stand aside of the grid: no descent begins on an anchor, where angles jump.
-[m]"""
+"""Displacement of starting points from the grid: no descent begins on an anchor, where angles are
+undefined. [m]"""
 
 
 def angle_difference(room: Room) -> Fix:
@@ -42,7 +42,7 @@ def angle_difference(room: Room) -> Fix:
 def from_differences(
     anchors: Float[np.ndarray, "anchors 2"], angles: Float[np.ndarray, " anchors"]
 ) -> Float[np.ndarray, " 2"]:
-    """Find the place from which anchors appear at angles from an unknown axis.
+    """Return the position at which anchors have the given angles from an unknown axis. [m].
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def from_differences(
     def residuals(place: Float[np.ndarray, " 2"]) -> Float[np.ndarray, " anchors"]:
         towards = anchors - place
         phasors = np.exp(1j * (np.arctan2(towards[:, 1], towards[:, 0]) - angles))
-        # The orientation that fits best is the mean; what is left are differences.
+        # The best orientation is the mean; the residuals are differences of angles.
         return np.asarray(np.angle(phasors / phasors.mean()))
 
     side = np.linspace(-REACH, REACH, STARTS)

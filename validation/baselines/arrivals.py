@@ -1,4 +1,4 @@
-"""What simple receivers measure of a pilot: strength, time and angle of arrival."""
+"""Measurements of simple receivers on a pilot: strength, time and angle of arrival."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -8,25 +8,26 @@ from scipy.optimize import minimize_scalar
 from estimator.measurement.model import Uplink
 
 FIRST_PATH_DB = -12.0
-"""Level over the strongest path from which an earlier one counts as the first; Hann's window
-keeps sidelobes below -31 dB. [dB]"""
+"""Least level of the first path relative to the strongest one; sidelobes of Hann's window are below
+-31 dB. [dB]"""
 DETECTION_DB = 13.0
-"""Peak over the median of the profile from which a path counts as heard: noise alone reaches
-that in one of some thousand cells. [dB]"""
+"""Least peak of a detected path over the median of the profile: noise alone exceeds it in one of
+some thousand cells. [dB]"""
 OVERSAMPLING = 8
-"""Lengths tried for each cell c/B: a search begins within a sixteenth of a cell of a peak. [-]"""
+"""Samples of length for each cell c/B: the search begins within a sixteenth of a cell of a peak.
+[-]"""
 MOST_PATHS = 6
-"""Paths at which the search over a band with gaps ends; chosen, not measured. [-]"""
+"""Most paths of the search over a band with gaps. Chosen, not measured. [-]"""
 LENGTH_TOLERANCE = 1e-7
-"""To which a path's length is searched: far below a wavelength of 1 mm. [m]"""
+"""Tolerance of a path's length: far below a wavelength of 1 mm. [m]"""
 ANGLE_OVERSAMPLING = 8
-"""Cosines tried for each antenna: at half a wavelength seven for each −3 dB beam, so that a search
-begins on the main lobe. [-]"""
+"""Samples of the cosine for each antenna: at half a wavelength, seven for each −3 dB beam, so that
+the search begins on the main lobe. [-]"""
 FEWEST_COSINES = 64
-"""Cosines that are tried of a small array, at least; chosen, not measured. [-]"""
+"""Least number of samples of the cosine, for small arrays. Chosen, not measured. [-]"""
 COSINE_TOLERANCE = 1e-8
-"""To which a cosine is searched: the square root of float64's rounding, below which a maximum is
-flat. [-]"""
+"""Tolerance of a cosine: the square root of float64's rounding, below which a maximum is flat.
+[-]"""
 
 
 def strength_db(pilot: Uplink) -> float:
@@ -40,7 +41,7 @@ def first_arrival(
     *,
     longest: float | None = None,
 ) -> float | None:
-    """Return the length of the earliest path that is not much weaker than the strongest [m].
+    """Return the length of the earliest path within :data:`FIRST_PATH_DB` of the strongest [m].
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def first_arrival(
 
     Returns
     -------
-    ``None`` if nothing stands out of the noise.
+    ``None`` if no path is detected.
     """
     reach = longest or float(speed_of_light / np.diff(frequencies).min())
     cell = float(speed_of_light / np.ptp(frequencies))
@@ -88,17 +89,17 @@ def first_sparse_arrival(
     *,
     most: int = MOST_PATHS,
 ) -> float | None:
-    """Return the same for a band with gaps: the profile is a sum of a few paths [m].
+    """Return the same for a band with gaps, with the profile as a sum of a few paths [m].
 
-    Orthogonal matching pursuit: the strongest path of what is left, refined off the grid, joins
-    the others, and all amplitudes are fitted anew.
+    Orthogonal matching pursuit: the strongest path of the residual, refined off the grid, is added,
+    and all amplitudes are fitted again.
 
     Parameters
     ----------
     samples, frequencies
         See :func:`first_arrival`.
     most
-        Number of paths at which the search ends.
+        Most paths.
     """
     cell = float(speed_of_light / np.ptp(frequencies))
     lengths = np.arange(0.0, speed_of_light / np.diff(frequencies).min(), cell / OVERSAMPLING)
@@ -133,7 +134,7 @@ def first_sparse_arrival(
 def plane_wave_angle(pilot: Uplink) -> float:
     """Return the angle of the strongest plane wave from the array's axis, band averaged [rad].
 
-    The maximum of Bartlett's spectrum, off the grid; the array's own axis runs from its first
+    The maximum of Bartlett's spectrum, refined off the grid; the array's axis is from its first
     element to its last.
     """
     axis = pilot.positions[-1] - pilot.positions[0]

@@ -1,12 +1,12 @@
 """Time of arrival over several bands, stitched, at the few antennas of one access point.
 
-Stands for Chronos (Vasisht, Kumar, Katabi, NSDI 2016): separate channels together give the
+Represents Chronos (Vasisht, Kumar, Katabi, NSDI 2016): separate channels together give the
 resolution of their whole span, and the distances to antennas of one access point give the
 position. Infrastructure: one access point, but of three antennas 0.10 m apart in a triangle (ours
-is a line of 0.13 m), on the user's clock. Eight channels of 2 GHz stand unevenly over our band, so
-that their grating lobes do not agree; the profile is inverted as a sum of few paths, one after
-the other, as the sidelobes of such a comb hide the first path otherwise. It assumes that the
-first path is the direct one.
+is a line of 0.13 m), on the user's clock. Eight channels of 2 GHz are spaced unevenly over our
+band, so that their grating lobes do not coincide; the profile is inverted as a sum of few paths,
+one after the other, since the sidelobes of such a comb would hide the first path. It assumes that
+the first path is the direct one.
 """
 
 import numpy as np
@@ -19,9 +19,10 @@ from validation.baselines.room import Anchor, Fix, Room
 ANTENNAS = (Anchor(x=-0.05, y=0.0), Anchor(x=0.05, y=0.0), Anchor(x=0.0, y=-0.0866))
 """An equilateral triangle of 0.10 m, about as large as our array is long. [m]"""
 CHANNELS = (0.0, 0.04, 0.13, 0.27, 0.42, 0.60, 0.83, 0.97)
-"""Where channels begin, over the band: unevenly, so that grating lobes do not agree. [-]"""
+"""Starts of the channels, relative to the band: uneven, so that grating lobes do not coincide.
+[-]"""
 WIDTH = 2e9
-"""Of a channel: as wide as those of IEEE 802.11ad, 2.16 GHz, about. [Hz]"""
+"""Width of a channel: about that of IEEE 802.11ad, 2.16 GHz. [Hz]"""
 
 
 def multiband_toa(room: Room) -> Fix:
@@ -39,7 +40,7 @@ def multiband_toa(room: Room) -> Fix:
 
 
 def in_channels(frequencies: Float[np.ndarray, " freqs"]) -> Bool[np.ndarray, " freqs"]:
-    """Tell which frequencies lie in a channel."""
+    """Return which frequencies are in a channel."""
     starts = frequencies[0] + np.array(CHANNELS) * np.ptp(frequencies)
     beyond = frequencies[:, None] - starts
     return np.asarray(np.any((beyond >= 0) & (beyond <= WIDTH), axis=1))

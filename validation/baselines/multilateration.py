@@ -5,12 +5,12 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 REACH = 2.5
-"""Half width of the square around the anchors in which positions are sought: beyond the rooms
-compared. [m]"""
+"""Half width of the square around the anchors in which positions are searched: larger than the
+rooms compared. [m]"""
 STARTS = 4
-"""Places on each side of the square from which the search descends. [-]"""
+"""Starting points of the descent along each side of the square. [-]"""
 CONVERGED = 1e-12
-"""Relative change of place, or of cost, that ends a descent: far below any error. [-]"""
+"""Relative change of position, or of cost, that ends a descent: far below any error. [-]"""
 
 
 def multilaterate(
@@ -20,7 +20,7 @@ def multilaterate(
     clock_known: bool = True,
     relative: bool = False,
 ) -> Float[np.ndarray, " 2"]:
-    """Find the place at given distances from anchors, as least squares has it.
+    """Return the least-squares position at given distances from anchors. [m].
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def multilaterate(
     distances
         [m]
     clock_known
-        Otherwise all distances are too long by the same unknown amount: their differences count.
+        If not, all distances have the same unknown offset, which is estimated too.
     relative
-        Whether the distances' relative errors are equal, as those of signal strengths are.
+        Whether the distances' relative errors are equal, as for ranging by signal strength.
     """
     anchors, centre = np.asarray(anchors), np.mean(anchors, axis=0)
 

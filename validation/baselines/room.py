@@ -1,9 +1,9 @@
-"""A scenario's room as other methods hear it: anchors where they need them, the same radio waves.
+"""A scenario's room for other methods: pilots at additional anchors, in the same realisation.
 
 The room is one frozen realisation of the scenario, that of our own measurement with the same
-seed. An anchor is a base station of its own, simulated like ours; every receiver has the noise of
-our base station's receiver, whose SNR the scenario states, but in another band: there a
-receiver has that SNR itself (:meth:`Room.pilot`).
+seed. An anchor is another base station, simulated like ours; every receiver has the noise of our
+base station's receiver, whose SNR the scenario states, except in another band: there each receiver
+has that SNR itself (:meth:`Room.pilot`).
 """
 
 from dataclasses import dataclass, replace
@@ -23,13 +23,13 @@ from simulator.scene.radio_scene import RadioScene, facet_ports, radio_scene
 from validation.analytic.point_scatterer import complex_noise
 
 LEVEL_ELEMENTS = 17
-"""Elements of our array, evenly spread, over which its noise's level is taken: the mean over 17
-that fade independently is known to a decibel. [-]"""
+"""Elements of our array, evenly spread, over which the signal level for its noise is averaged: the
+error of the mean over 17 independently fading ones is a decibel. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Anchor:
-    """A receiver at a known place: an array, or a single antenna."""
+    """A receiver at a known position: an array, or a single antenna."""
 
     x: float  # [m]
     y: float  # [m]
@@ -49,21 +49,21 @@ ANCHORS = (
     Anchor(x=-0.15, y=0.0),
     Anchor(x=0.12, y=-0.25),
 )
-"""Where methods of several anchors put them: ours, and three more that see the same room. All of
-them see the hidden user of ``slam_2d`` in its wall, and only there; they are not in a line, which
-would leave its two sides apart. [m]"""
+"""Anchors of methods that need several: ours, and three more in the same room. All of them receive
+the hidden user of ``slam_2d`` over its wall only; they are not in a line, which would not
+distinguish its two sides. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fix:
-    """Where a method puts the user, or why it does not."""
+    """A method's position of the user, or the reason for none."""
 
     position: Float[np.ndarray, " 2"] | None  # [m]
     reason: str | None = None
 
 
 class Baseline(Protocol):
-    """A method of locating the user of a room; it knows its anchors, and hears pilots."""
+    """A method of locating the user of a room from pilots at known anchors."""
 
     def __call__(self, room: "Room") -> Fix:
         """Locate the user."""
@@ -91,7 +91,7 @@ class Room:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario; a method may look at its radio and its array, not at user or walls."""
+        """The scenario; a method may use its radio and its array, not user or walls."""
         return self._scenario
 
     @property
@@ -122,18 +122,18 @@ class Room:
         survey: Float[np.ndarray, " 2"] | None = None,
         offset: Float[np.ndarray, " 2"] | None = None,
     ) -> Uplink:
-        """Hear the user, or for a survey one of the same antenna at a known place.
+        """Return the pilot of the user, or for a survey of the same antenna at a known position.
 
         Parameters
         ----------
         anchor
-            Receives.
+            The receiver.
         radio
-            Its band, in which its SNR is the scenario's; ``None``: ours, with our noise.
+            Another band, in which the SNR is the scenario's; ``None``: ours, with our noise.
         survey
-            Known place of a surveying user; ``None``: the user itself. [m]
+            Known position of a survey; ``None``: the user itself. [m]
         offset
-            From the user's centre to the antenna of an array of its own that sends. [m]
+            From the user's centre to the transmitting antenna of its array. [m]
         """
         where = self._scenario.users[self._name].position if survey is None else _in_plane(survey)
         if offset is not None:
@@ -151,16 +151,16 @@ class Room:
     def pilot_at_user(
         self, anchor: Anchor, *, elements: int, turn: float, radio: Radio | None = None
     ) -> Uplink:
-        """Let an array at the user hear an anchor: same antennas, the other direction.
+        """Return the pilot of an anchor at an array of the user, with the same antennas.
 
         Parameters
         ----------
         anchor
-            Sends from its centre.
+            The transmitter, at its centre.
         elements
             Of the user's array, half a wavelength of our highest frequency apart.
         turn
-            By which the array is turned away from where the user looks, unknown to it. [rad]
+            Rotation of the array from the user's aim, unknown to the method. [rad]
         radio
             See :meth:`pilot`.
         """

@@ -1,10 +1,10 @@
 """Ranging by signal strength: a path-loss model, calibrated, and multilateration.
 
-Stands for the family of RADAR's propagation model and its successors (Bahl and Padmanabhan,
+Represents the family of RADAR's propagation model and its successors (Bahl and Padmanabhan,
 INFOCOM 2000). Beyond ours it needs three more anchors (of one antenna each, at
 :data:`validation.baselines.room.ANCHORS`), and a survey: pilots of the same transmitter at
 known places, from which the level at 1 m and the exponent of the path loss are fitted. It assumes
-that strength tells distance: the same antenna gain everywhere, no shadowing, no second path.
+that strength determines distance: the same antenna gain everywhere, no shadowing, no second path.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from validation.baselines.multilateration import multilaterate
 from validation.baselines.room import ANCHORS, Fix, Room
 
 SURVEY = np.array([[0.15, 0.25], [0.3, 0.35], [0.4, 0.5], [0.55, 0.6], [0.6, 0.8], [0.8, 0.7]])
-"""Known places of the calibration. [m]"""
+"""Known positions of the calibration. [m]"""
 
 
 def rssi_ranging(room: Room) -> Fix:
@@ -37,6 +37,6 @@ def rssi_ranging(room: Room) -> Fix:
 def path_loss(
     distances: Float[np.ndarray, " n"], levels_db: Float[np.ndarray, " n"]
 ) -> tuple[float, float]:
-    """Fit the level over the logarithm of distance: slope [dB a decade], and level at 1 m [dB]."""
+    """Fit the level over the logarithm of distance: slope [dB per decade], level at 1 m [dB]."""
     slope, level = np.polyfit(np.log10(distances), levels_db, 1)
     return float(slope), float(level)

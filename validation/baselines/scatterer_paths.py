@@ -1,14 +1,15 @@
 r"""Angles at both ends and the length of single-bounce paths of one transmitter.
 
-Stands for positioning by non-line-of-sight paths without a map (Miao, Yu, Juang, IEEE Trans. Veh.
+Represents positioning by non-line-of-sight paths without a map (Miao, Yu, Juang, IEEE Trans. Veh.
 Technol. 2007; Shahmansoori et al., IEEE Trans. Wireless Commun. 2018). Infrastructure: one base
 station, ours, but an array at the user too (two rows of 8 antennas across each other, 0.5 mm
 apart), whose orientation is known.
 
-A path that leaves the user towards :math:`\hat s_u`, arrives from :math:`\hat s_a` and is L long
-puts the user on the line :math:`q + r \hat s_a - (L - r) \hat s_u` for any r, wherever the bounce
-was: two such paths intersect, a direct one (:math:`\hat s_u = -\hat s_a`) is a point by itself.
-A single path over a mirror leaves a line, and so no answer.
+A path of length L that departs from the user towards :math:`\hat s_u` and arrives from
+:math:`\hat s_a` restricts the user to the line :math:`q + r \hat s_a - (L - r) \hat s_u`, with the
+unknown distance r of the bounce. The lines of two such paths intersect; a direct one
+(:math:`\hat s_u = -\hat s_a`) gives a point. A single path over a mirror gives only a line, and so
+no position.
 """
 
 from dataclasses import dataclass, replace
@@ -24,31 +25,31 @@ from validation.baselines.room import Fix, Room
 USER_ELEMENTS = 8
 """Antennas in each of the user's two rows. [-]"""
 USER_SPACING = 0.5e-3
-"""Their distance: half a wavelength at 300 GHz. [m]"""
+"""Spacing of these antennas: half a wavelength at 300 GHz. [m]"""
 LISTENING = 16
-"""Elements of our array that hear each of the user's antennas; all hear the first one. [-]"""
+"""Elements of our array that receive each of the user's antennas; all receive the first one. [-]"""
 POINTS = 501
-"""Frequencies at which paths are looked for: unambiguous to 2 m over 75 GHz. [-]"""
+"""Frequencies of the path search: unambiguous to 2 m over 75 GHz. [-]"""
 LISTENING_POINTS = 161
-"""Frequencies at which they do: enough to tell paths apart that were found with all. [-]"""
+"""Frequencies at which these elements receive: enough to separate paths already found. [-]"""
 MOST_PATHS = 4
-"""Paths at which the search ends: as many as our own estimator takes. [-]"""
+"""Most paths of the search: as many as in our own estimator. [-]"""
 WEAKEST_DB = -15.0
-"""Level over the strongest path down to which paths are used: below, a rough wall's speckle is
-taken for paths. [dB]"""
+"""Least level of a path relative to the strongest one: below, a rough wall's speckle would be taken
+for paths. [dB]"""
 DIRECT = np.radians(3.0)
-"""Angle within which departure and arrival face each other: a wavelength over one of the user's
-rows is 19°, and a strong path's direction is known to a part of that. [rad]"""
+"""Largest angle between departure and reversed arrival of a direct path: the beam of one of the
+user's rows is 19°, and the error of a strong path's direction is a fraction of that. [rad]"""
 DIRECTION_STEP_DEG = 0.05
-"""Distance of directions that are tried: far below a row's beam of 19°. [°]"""
+"""Step of the searched directions: far below a row's beam of 19°. [°]"""
 PARALLEL = 1e-4
-"""Least eigenvalue of the lines' normal matrix from which they intersect: of two lines it is the
-squared sine of half the angle between them, doubled, here 0.8°. [-]"""
+"""Least eigenvalue of the lines' normal matrix for an intersection: for two lines it is twice the
+squared sine of half the angle between them, here 0.8°. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BouncePath:
-    """One path as both ends see it."""
+    """Directions of one path at both ends, and its length."""
 
     arrives_from: Float[np.ndarray, " 2"]  # unit vector at the base station
     leaves_to: Float[np.ndarray, " 2"]  # unit vector at the user
@@ -110,8 +111,8 @@ def departure(
 ) -> Float[np.ndarray, " 2"]:
     """Return the direction in which a path leaves the user, from its phase at each antenna.
 
-    An antenna that stands nearer to the bounce is heard earlier: the phase rises with
-    the offset along the direction. Compared with all directions, 0.05° apart.
+    The signal of an antenna nearer to the point of reflection arrives earlier: the phase rises with
+    the offset along the direction. All directions are tried in steps of 0.05°.
     """
     angles = np.radians(np.arange(0.0, 360.0, DIRECTION_STEP_DEG))
     towards = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -126,7 +127,7 @@ def intersect(station: Float[np.ndarray, " 2"], paths: list[BouncePath]) -> Fix:
     Parameters
     ----------
     station
-        Where the base station is. [m]
+        Position of the base station. [m]
     paths
         The strongest first.
     """

@@ -1,9 +1,9 @@
 """Angle and time of arrival at one array, without a map.
 
-Stands for single-anchor mmWave positioning (after Lemic et al. and the thesis' own first step):
+Represents single-anchor mmWave positioning (after Lemic et al. and the thesis' own first step):
 our base station, our pilot and our path search, but no echo, and so no walls. The strongest path
-is taken to be direct; over a mirror that is the user's image, as far behind the wall as the user
-is before it.
+is assumed to be direct; over a mirror this gives the user's image, as far behind the wall as the
+user is in front of it.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from validation.baselines.room import Fix, Room
 
 
 def single_array(room: Room) -> Fix:
-    """Take the strongest path for the direct one."""
+    """Locate the user by the strongest path, assumed to be direct."""
     station = room.scenario.base_station
     x, y, _ = station.centre
     pilot = room.pilot(room.own_array)

@@ -1,12 +1,12 @@
 """An angle of arrival at a low band steers a mmWave beam, which measures the range.
 
-Stands for hybrids of a low and a high band: the low band finds the direction, whence the high
+Represents hybrids of a low and a high band: the low band finds the direction, so that the high
 band needs no search of beams (Nitsche et al., "Steering with eyes closed", INFOCOM 2015, ranging
 added). Infrastructure: one base station with a second array of 8 elements for 28 GHz, half a
 wavelength apart (37 mm), beside ours, of which 32 elements form the plane-wave beams of a codebook
-λ/2D apart (all 260 would be in the near field out to 29 m, where such beams blur). The direction
-is that of the best beam, interpolated between its neighbours' powers; the position is where the
-range lies along it. It assumes that the path it finds is direct.
+λ/2D apart (with all 260 the near field, in which such beams lose gain, would extend to 29 m). The
+direction is that of the best beam, interpolated between its neighbours' powers; the position is at
+the measured range along it. It assumes that the path is direct.
 """
 
 from dataclasses import replace
@@ -19,14 +19,14 @@ from validation.baselines.arrivals import first_arrival, plane_wave_angle
 from validation.baselines.room import Fix, Room
 
 LOW = Radio(start_ghz=27.5, stop_ghz=28.5, points=11)
-"""The low band: 1 GHz about 28 GHz, as 5G uses. [GHz]"""
+"""The low band: 1 GHz about 28 GHz, as in 5G. [GHz]"""
 LOW_ELEMENTS = 8
 """Antennas of the low band's array: 37 mm. [-]"""
 BEAM_ELEMENTS = 32
 """Elements of ours that form a beam: beyond 0.44 m they are in the far field. [-]"""
 MOST_BEAMS = 64
-"""Beams on either side of the low band's direction that are listed: 0.034 in cosine apart, they
-reach over all directions, of which those in the low band's beam are tried. [-]"""
+"""Beams listed on either side of the low band's direction: 0.034 in cosine apart, they cover all
+directions; those in the low band's beam are tried. [-]"""
 
 
 def steered_ranging(room: Room) -> Fix:

@@ -1,10 +1,10 @@
 """Differences of the time of arrival at several receivers.
 
-Stands for hyperbolic positioning (after Chan and Ho, IEEE Trans. Signal Process. 1994): the
+Represents hyperbolic positioning (after Chan and Ho, IEEE Trans. Signal Process. 1994): the
 receivers share a clock, the user needs none. Beyond ours it needs three more receivers (at
 :data:`validation.baselines.room.ANCHORS`), synchronised to picoseconds. It assumes that the first
-path is the direct one. The compact receivers make hyperbolas cross at a flat angle: range is
-known far worse than direction.
+path is the direct one. As the receivers are close together, hyperbolas intersect at small angles:
+the error of range is much larger than that of direction.
 """
 
 from validation.baselines.room import Fix, Room

@@ -1,6 +1,6 @@
 """Time of arrival at several anchors, and multilateration.
 
-Stands for ultra-wideband ranging (IEEE 802.15.4a, 4z) on our band. Beyond ours it needs three
+Represents ultra-wideband ranging (IEEE 802.15.4a, 4z) on our band. Beyond ours it needs three
 more anchors (of one antenna each, at :data:`validation.baselines.room.ANCHORS`), all on the
 user's clock. It assumes that the first path is the direct one.
 """
@@ -12,8 +12,8 @@ from validation.baselines.multilateration import multilaterate
 from validation.baselines.room import ANCHORS, Fix, Room
 
 FEWEST = 3
-"""Anchors that must hear the user, and one more where its clock is unknown: two circles intersect
-at two places. [-]"""
+"""Least number of anchors that receive the user, plus one if its clock is unknown: two circles
+intersect at two points. [-]"""
 
 
 def toa_trilateration(room: Room, *, clock_known: bool = True) -> Fix:

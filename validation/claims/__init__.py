@@ -1,4 +1,4 @@
-"""All claims, by what they are about."""
+"""All claims, by subject."""
 
 from validation.claims import (
     closed_forms,
@@ -26,4 +26,4 @@ ALL_CLAIMS: tuple[Claim, ...] = (
     *limits.CLAIMS,
     *random_rooms.CLAIMS,
 )
-"""In the order in which they are told: physics first, then what is built on it."""
+"""All claims in the order of the results page: physics first, then estimation."""

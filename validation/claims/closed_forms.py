@@ -92,7 +92,7 @@ def coherent_loss(effort: Effort, tell: Tell) -> Finding:
     measured = mean_specular_field(levels, side=side, length=length, draws=draws, advance=tell)
     expected = np.exp(-2 * levels**2)
     patches = draws * (side / length) ** 2
-    # At k·rms·cosθ near 1 half the square of a correlation length decorrelates.
+    # Near k·rms·cosθ = 1 the field decorrelates over half the square of a correlation length.
     scatter = 1 / np.sqrt(2 * patches) / expected
     rows = [
         Row(
@@ -104,7 +104,7 @@ def coherent_loss(effort: Effort, tell: Tell) -> Finding:
             origin="10 % as asked for; the mean of so many patches scatters by "
             f"{100 * spread:.1f} %",
         )
-        # Few draws leave the deepest loss within its own scatter: that is for the full form.
+        # With few draws the largest loss is below its statistical error: full form only.
         for level, value, loss, spread in zip(levels, measured, expected, scatter, strict=True)
         if level > 0 and spread < 0.06
     ]

@@ -1,4 +1,4 @@
-"""Waves round edges: pilots into the shadow, against Sommerfeld's half plane."""
+"""Edge diffraction: pilots in the shadow, against Sommerfeld's half plane."""
 
 import numpy as np
 from scipy.constants import speed_of_light
@@ -9,7 +9,7 @@ from validation.analytic.half_plane import half_plane_over_free_space
 from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 
 EDGE = np.array([0.0, 0.5])
-"""Where the half plane ends; it leads to -x. [m]"""
+"""Edge of the half plane, which extends to -x. [m]"""
 
 FAR = 200.0
 """Height of the user over the array: its wave is plane within 0.3 %. [m]"""
@@ -45,7 +45,7 @@ def _over_free_space(scene: Scenario) -> np.ndarray:
 
 
 def into_the_shadow(effort: Effort, tell: Tell) -> Finding:
-    """Put a user behind a half plane, and move an array through its shadow boundary."""
+    """Compare the pilot of a user behind a half plane, with an array across the shadow boundary."""
     rows, levels = [], []
     for number, ((material, polarization), reflection) in enumerate(REFLECTIONS.items()):
         scene = _scene(material, polarization, [0.3 * FAR, FAR], 41)

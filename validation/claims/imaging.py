@@ -1,4 +1,4 @@
-"""The estimator on closed-form signals: where points focus, how wide, and both image formers."""
+"""The estimator on closed-form signals: positions and widths of points, and both image formers."""
 
 import numpy as np
 from jaxtyping import Float
@@ -19,10 +19,10 @@ HALF_POWER = 0.886  # width of a sinc² at half its peak, over its first null
 
 HALF = np.sqrt(0.5)
 LOBES = 20
-"""First zeros c/B either side up to which sidelobes are counted. [-]"""
+"""Extent to either side over which sidelobes are compared, in first zeros c/B. [-]"""
 LOBES_WITHIN_DB = 0.3
-"""How far sidelobes may differ from those of a sinc: an amplitude of 1 + x·u over the band adds x²
-to their energy, 0.1 dB at ±15 %, and the bend of 1/f about as much again. [dB]"""
+"""Largest difference of sidelobes from those of a sinc: an amplitude of 1 + x·u over the band adds
+x² to their energy, 0.1 dB at ±15 %, and the curvature of 1/f about as much again. [dB]"""
 
 
 def array(count: int, length: float = LENGTH) -> Float[np.ndarray, "positions 3"]:
@@ -97,7 +97,7 @@ def image_formers(effort: Effort, tell: Tell) -> Finding:
 
 
 def pilot(effort: Effort, tell: Tell) -> Finding:
-    """Focus a closed-form pilot: one way, not two."""
+    """Focus a closed-form pilot, which travels one way only."""
     positions = array(260)
     source = np.array([0.31, 1.2, 0.0])
     uplink = point_uplink(source[None], positions=positions, frequencies=BAND)

@@ -1,4 +1,4 @@
-"""How good it can be: bounds, other methods, roughness, calibrated uncertainties, traps."""
+"""Limits of accuracy: bounds, other methods, roughness, calibrated uncertainties, traps."""
 
 from matplotlib.figure import Figure
 
@@ -9,11 +9,11 @@ from validation.harness.claim import Claim, Effort, Finding, Row, Tell
 from validation.metrics.coverage import coverage
 from validation.trials.trap_rooms import TRAPS
 
-NO_ANSWER = 1e3  # an error that stands for none [m]
+NO_ANSWER = 1e3  # error that represents a missing position [m]
 
 
 def position_bounds(effort: Effort, tell: Tell) -> Finding:
-    """Compare measured errors with the Cramér-Rao bound and the floor that roughness sets."""
+    """Compare measured errors with the Cramér-Rao bound and the floor by roughness."""
     chosen = bounds.FULL if effort == "full" else bounds.QUICK
     found: list[bounds.Comparison] = []
     for comparison in bounds.position_bounds(chosen):
@@ -116,7 +116,7 @@ def other_methods(effort: Effort, tell: Tell) -> Finding:
                 Row(
                     name=f"{method}, {case}: {'median' if surveyed else 'best'} error",
                     stated="centimetres to decimetres" if surveyed else "decimetres, or no answer",
-                    # No answer at all is as far off as can be told.
+                    # A missing position counts as the largest error.
                     measured=1e3 * min(error, NO_ANSWER),
                     unit="mm",
                     low=1e3 * (10 * others.MILLIMETRE if surveyed else others.DECIMETRES),
@@ -144,7 +144,7 @@ def other_methods(effort: Effort, tell: Tell) -> Finding:
 
 
 def calibration(effort: Effort, tell: Tell) -> Finding:
-    """Compare errors with the covariances that are told."""
+    """Compare errors with the stated covariances."""
     rows = []
     results = {}
     variants, trials = uncertainty_calibration.VARIANTS, uncertainty_calibration.TRIALS
@@ -210,7 +210,7 @@ def calibration(effort: Effort, tell: Tell) -> Finding:
 
 
 def pitfalls(effort: Effort, tell: Tell) -> Finding:
-    """Try rooms that mislead: no answer is fine, a confident wrong one is not."""
+    """Locate users in trap rooms: missing positions are allowed, confidently wrong ones not."""
     wrong: list[str] = []
     answered = 0
     rooms = list(TRAPS.items())

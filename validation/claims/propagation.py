@@ -1,4 +1,4 @@
-"""The simulator's laws: reciprocity, specular chains, slabs."""
+"""Physical laws in the simulator: reciprocity, specular chains, slabs, energy."""
 
 import numpy as np
 from jaxtyping import Complex
@@ -160,11 +160,11 @@ def slab(effort: Effort, tell: Tell) -> Finding:
     return Finding(rows=rows, draw=draw)
 
 
-FINER = 8  # spacing of the grid that is compared with, as a part of the default one [-]
+FINER = 8  # default spacing over that of the reference grid [-]
 
 
 def facet_grid(effort: Effort, tell: Tell) -> Finding:
-    """Cut a rough wall into facets as the simulator does, coarser and finer."""
+    """Compare the simulator's facet spacing of a rough wall with coarser and finer ones."""
     scenario = load_scenario(
         "slam_2d",
         [
@@ -227,7 +227,7 @@ def _wall_echo(scenario: Scenario, spacing: float) -> Complex[np.ndarray, "posit
 
 
 def rough_plate(effort: Effort, tell: Tell) -> Finding:
-    """Measure rough plates in space against small perturbations and the law of energy."""
+    """Compare rough plates in 3-D with small perturbations and conservation of energy."""
     plates, azimuths = (12, 48) if effort == "full" else (4, 16)
     found = backscatter(plates, azimuths)
     tell(1, 2)

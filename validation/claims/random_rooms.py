@@ -1,4 +1,4 @@
-"""Rooms that nobody drew: how often the answer is right, wrong or left open."""
+"""Random rooms: shares of right, wrong and ambiguous answers."""
 
 import math
 
@@ -13,18 +13,18 @@ ROOMS = 200
 PICTURES = 4
 
 WRONG = 0.03
-"""Share of rooms with a confidently wrong place that is not exceeded today: none of 25 had one, so
-that it is below 0.11 with 95 %. [-]"""
+"""Share of rooms with a confidently wrong position at present: none of 25 rooms had one, so that it
+is below 0.11 with 95 % confidence. [-]"""
 FALSE_MIRRORS = 0.04
 """The same of false mirrors, for each room. [-]"""
 ANSWERED = 0.50
-"""Share of the rooms that the oracle answers in which the user is found and right, today. [-]"""
+"""Share of right users among rooms that the oracle answers, at present. [-]"""
 WALLS = 0.75
-"""Share of the walls that the echo shows which are found, today. [-]"""
+"""Share of detected walls among those that the echo shows, at present. [-]"""
 
 
 def random_rooms(effort: Effort, tell: Tell) -> Finding:
-    """Answer rooms drawn at random, which were never tuned on."""
+    """Locate users in rooms drawn at random that were not used for tuning."""
     scores = judge_rooms("plain", range(ROOMS), purpose="judging", tell=tell)
     found = summarise(scores)
     today = "what is reached today, with the scatter of so many rooms; the aim stands beside it"
@@ -72,12 +72,12 @@ def random_rooms(effort: Effort, tell: Tell) -> Finding:
 
 
 def _most(share: float, count: int) -> float:
-    """Return three deviations more than a share of so many. [-]."""
+    """Return a share of a count plus three standard deviations. [-]."""
     return count * share + 3 * math.sqrt(count * share * (1 - share))
 
 
 def _least(share: float, count: int) -> float:
-    """Return three deviations less than a share, of so many. [-]."""
+    """Return a share of a count less three standard deviations. [-]."""
     return max(0.0, share - 3 * math.sqrt(share * (1 - share) / max(count, 1)))
 
 

@@ -1,4 +1,4 @@
-"""End to end, over seeds of roughness and noise and moved geometries: simulate, then locate."""
+"""End to end over seeds of roughness and noise and moved geometries: simulate, then locate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,14 +35,14 @@ class Run:
     truth: Truth
 
     def user_error(self, user: str) -> float | None:
-        """Return how far a user was found from the truth, None without a sure answer [m]."""
+        """Return the error of a user with the status found, None otherwise [m]."""
         for found in self.estimate.users:
             if found.name == user and found.status == "found" and found.position is not None:
                 return float(np.linalg.norm(found.position - self.truth.user_position[user]))
         return None
 
     def user_square(self, user: str) -> float:
-        """Return the square of its error over its covariance, infinite without an answer [-]."""
+        """Return the normalised square of its error, infinite without a position [-]."""
         for found in self.estimate.users:
             square = position_errors(found, self.truth.user_position[found.name])[1]
             if found.name == user and square is not None:
@@ -51,7 +51,7 @@ class Run:
 
 
 def run(name: str, *, seed: int, changes: Sequence[str] = ()) -> Run:
-    """Simulate a scenario and locate what is in it; the truth is looked at afterwards."""
+    """Simulate a scenario and locate walls and users; the truth is used only afterwards."""
     simulated = simulate(load_scenario(name, list(changes)), seed=seed)
     return Run(
         name=name,
@@ -62,7 +62,7 @@ def run(name: str, *, seed: int, changes: Sequence[str] = ()) -> Run:
 
 
 def draw_run(found: Run, figure: Figure) -> None:
-    """Draw the plan of what was found, with the truth."""
+    """Draw the plan of the estimate, with the truth."""
     axes, truth = figure.subplots(), found.truth
     array = found.measurement.uplinks[0] if found.measurement.uplinks else found.measurement.echo
     if array is None:
@@ -87,11 +87,11 @@ def draw_errors(
     grown: float,
     figure: Figure,
 ) -> None:
-    """Draw errors of a position, and the regions that hold 95 % of what heights alone do [mm]."""
+    """Draw position errors, and the 95 % regions of the errors by roughness alone [mm]."""
     axes = figure.subplots()
     turn = np.linspace(0, 2 * np.pi, 181)
     circle = np.sqrt(chi2.ppf(0.95, 2)) * np.stack([np.cos(turn), np.sin(turn)])
-    # Along the direct way heights move nothing, and the floor may be flat to rounding.
+    # Heights have no effect along the direct path: the ellipse may have zero width.
     values, vectors = np.linalg.eigh(floor)
     region = 1e3 * (vectors * np.sqrt(np.maximum(values, 0))) @ circle
     axes.plot(*region, label="floor of the heights, first order (95 %)")
@@ -137,13 +137,13 @@ MOVED = (
     ("users.user.position_m=[0.8, 0.8]",),
     ("users.user.position_m=[1.2, 0.85]",),
 )
-"""Geometries of the SLAM scene: the wall turned, the user nearer and farther."""
+"""Geometries of the SLAM scene: the wall rotated, the user nearer and farther."""
 ROUGHER = ("objects.wall.roughness.rms_mm=0.15",)
-"""A wall that takes 5.7 dB of the mirror-like wave, phases of 1.14 rad."""
+"""A wall with a coherent loss of 5.7 dB, at an rms phase of 1.14 rad."""
 
 
 def slam(effort: Effort, tell: Tell) -> Finding:
-    """Locate the user of ``slam_2d`` where wall and user stand elsewhere."""
+    """Locate the user of ``slam_2d`` with wall and user moved."""
     seeds = SEEDS if effort == "full" else 1
     jobs = [(seed, moved) for moved in MOVED for seed in range(seeds)][: None if seeds > 1 else 1]
     runs = []
@@ -178,11 +178,11 @@ def slam(effort: Effort, tell: Tell) -> Finding:
 
 
 def rougher_wall(effort: Effort, tell: Tell) -> Finding:
-    """Locate the user of ``slam_2d`` over a wall whose heights set the error, not the noise."""
+    """Locate the user of ``slam_2d`` over a wall whose roughness dominates the error."""
     del effort
     scenario = load_scenario("slam_2d", list(ROUGHER))
     floor = roughness_floor(scenario, "user", "wall")
-    # The heights' part of the field grows as exp(φ²) - 1 where the floor, to first order, says φ².
+    # The diffuse part grows as exp(φ²) - 1; the first-order floor assumes φ².
     grown = np.sqrt(np.expm1(floor.phase**2)) / floor.phase
     runs = []
     for seed in range(SEEDS):
@@ -190,7 +190,7 @@ def rougher_wall(effort: Effort, tell: Tell) -> Finding:
         tell(seed + 1, SEEDS)
     errors = np.array([one.user_error("user") or np.inf for one in runs])
     squares = [one.user_square("user") for one in runs]
-    # Errors lie along one direction, across the ray: their squares add up to χ² of as many trials.
+    # Errors are along one direction, across the ray: their sum of squares is χ² of the trials.
     low, high = np.sqrt(chi2.ppf([0.0005, 0.9995], SEEDS) / SEEDS)
     half = beta.ppf(0.0005, SEEDS // 2, SEEDS - SEEDS // 2 + 1)
     rows = [
@@ -257,7 +257,7 @@ def in_sight(effort: Effort, tell: Tell) -> Finding:
 
 
 def room(effort: Effort, tell: Tell) -> Finding:
-    """Locate both users of the room in space."""
+    """Locate both users of the 3-D room."""
     found = run("room_3d", seed=0)
     tell(1, 1)
     rows = [

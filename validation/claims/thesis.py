@@ -22,7 +22,7 @@ SEEDS = 10
 
 
 def design_numbers(effort: Effort, tell: Tell) -> Finding:
-    """Measure widths, steps and ranges on point responses, beside theory and thesis."""
+    """Measure widths, steps and ranges on point responses, against theory and thesis."""
     found = eq02_design_numbers.measure()
     tell(1, 1)
     return Finding(
@@ -42,7 +42,7 @@ def drywall(effort: Effort, tell: Tell) -> Finding:
 
 
 def hidden_imaging(module: ModuleType, effort: Effort, tell: Tell) -> Finding:
-    """Image what is hidden behind a corner over a rough drywall."""
+    """Image objects behind a corner over a rough drywall."""
     count = SEEDS if effort == "full" else 1
     results = []
     for seed in range(count):

@@ -1,4 +1,4 @@
-"""Waves through slabs: against Airy's sum, the integral over plane waves, and Sionna RT."""
+"""Transmission through slabs, against Airy's sum, the plane-wave integral, and Sionna RT."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ def _room(wall: bool, angle_deg: float) -> Scenario:
 
 
 def airy_drywall(frequencies: np.ndarray, angle: float) -> np.ndarray:
-    """Sum the echoes within P.2040-4 plasterboard, field across, one by one. [-]."""
+    """Sum the internal reflections of P.2040-4 plasterboard in TE polarization, one by one. [-]."""
     giga = frequencies / 1e9
     permittivity = 2.73 - 17.98j * 0.0085 * giga**0.9395 / giga
     inner = np.sqrt(permittivity - np.sin(angle) ** 2)
@@ -55,7 +55,7 @@ def airy_drywall(frequencies: np.ndarray, angle: float) -> np.ndarray:
 
 
 def behind_drywall(effort: Effort, tell: Tell) -> Finding:
-    """Put a user behind drywall, and slabs of all kinds between a source and a receiver."""
+    """Compare a user's pilot behind drywall, and various slabs between source and receiver."""
     frequencies = np.linspace(BAND[0] * 1e9, BAND[1] * 1e9, BAND[2])
     levels, airy = [], []
     angles = (0.0, 30.0, 60.0)

@@ -1,8 +1,8 @@
-"""What the thesis' design equations say of its radio, and what is measured of that on points.
+"""Numbers of the thesis' design equations, by theory and measured on ideal points.
 
-Each number is theory's (:mod:`estimator.array.resolution`, :mod:`estimator.array.field_regions`)
-beside one that comes from the response of imaging and matched filter to one ideal point, in closed
-form, or from the phases of that closed form.
+Theory is that of :mod:`estimator.array.resolution` and :mod:`estimator.array.field_regions`.
+Numbers are measured on the response of imaging and matched filter to one ideal point, in closed
+form, or on the phases of that closed form.
 """
 
 from dataclasses import dataclass
@@ -27,18 +27,19 @@ from validation.metrics.point_response import PeakCut, peak_cut
 
 ELEMENTS, SPACING = 260, 0.5e-3
 LENGTH = ELEMENTS * SPACING
-"""Each element stands for one spacing. [m]"""
+"""Length of the array: each element represents one spacing. [m]"""
 SIMULATION = np.linspace(220e9, 295e9, 1001)
 LABORATORY = np.linspace(220e9, 329.98e9, 2750)
-"""Every other point of the laboratory's 5500: unambiguous to 3.7 m, and equally wide lobes. [Hz]"""
+"""Every other point of the laboratory's 5500: unambiguous to 3.7 m, with lobes of equal width.
+[Hz]"""
 NEAR, FAR = 1.8, 2.8
 WIDTHS_WITHIN = 0.05
-"""Of -3 dB widths: the formulas are those of a narrow band and a small aperture. Here the band is
-up to 40 % wide, which narrows the lobe by some per cent of it. [-]"""
+"""Largest relative error of -3 dB widths: the formulas are for a narrow band and a small aperture.
+Here the band is up to 40 % wide, which narrows the lobe by some per cent. [-]"""
 PHASES_WITHIN = 0.02
-"""Of phases at the field regions' bounds: terms of the next order, (D/2R)². [-]"""
+"""Largest relative error of phases at the field regions' bounds: the next order, (D/2R)². [-]"""
 EXACT = 1e-3
-"""Of what a grid of a thousandth of the quantity finds. [-]"""
+"""Largest relative error of quantities read from a grid of a thousandth of their value. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +53,7 @@ class Number:
     measured: float
     within: float  # largest relative difference of the two [-]
     origin: str  # of that
-    thesis: float | None = None  # what it says; None: nothing
+    thesis: float | None = None  # value in the thesis; None: not stated
     remark: str = ""
 
 
@@ -65,12 +66,12 @@ class Cut:
     magnitude: Float[np.ndarray, " samples"]  # over the peak's [-]
     peak: PeakCut
     theory: float  # -3 dB width, in the coordinate's unit
-    thesis: float | None = None  # what it says of that width
+    thesis: float | None = None  # width in the thesis
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignNumbers:
-    """All numbers, and the cuts that widths were measured on."""
+    """All numbers, and the cuts on which widths were measured."""
 
     numbers: tuple[Number, ...]
     across: tuple[Cut, ...]  # at 1.8 m and 2.8 m, echo and uplink
@@ -210,7 +211,7 @@ def _along(distance: float, frequencies: Float[np.ndarray, " freqs"], *, passes:
 
 
 def _first_zero(cut: Cut) -> float:
-    """Return how far the first minimum beside the main lobe is from its peak."""
+    """Return the distance of the first minimum beside the main lobe from its peak."""
     beyond = cut.coordinate > cut.peak.place + cut.peak.width / 2
     values, places = cut.magnitude[beyond], cut.coordinate[beyond]
     turn = int(np.flatnonzero(np.diff(values) > 0)[0])
@@ -238,7 +239,7 @@ def _beam_width() -> Number:
 
 
 def _lobes() -> Cut:
-    """Match the echo of a point far away, at one frequency, to plane waves over sin φ."""
+    """Correlate the echo of a distant point, at one frequency, with plane waves over sin φ."""
     frequency, distance = float(SIMULATION[-1]), 1e3
     sine = np.linspace(-1, 1, 5001)[1:-1]
     place = np.array([0.3, np.sqrt(1 - 0.3**2), 0.0]) * distance
@@ -338,11 +339,11 @@ def _phase_step() -> Number:
 
 
 def _field_regions() -> tuple[Number, ...]:
-    """Measure the wavefront's bend at the aperture's ends, at the bounds (3-1) and (3-3)."""
+    """Measure the wavefront's phase at the aperture's ends, at the bounds (3-1) and (3-3)."""
     frequency = float(SIMULATION[0])
     wavelength = speed_of_light / frequency
     far, fresnel = far_field_distance(LENGTH, wavelength), fresnel_distance(LENGTH, wavelength)
-    steepest = np.arctan(np.sqrt(2))  # off broadside where the cubic term is largest: 54.7°
+    steepest = np.arctan(np.sqrt(2))  # angle of the largest cubic term: 54.7° off broadside
     bends = {
         distance: _end_phases(np.array([0.0, distance, 0.0]), frequency) for distance in (far, 20.0)
     }
@@ -385,12 +386,12 @@ def _field_regions() -> tuple[Number, ...]:
 
 
 def _end_phases(place: Float[np.ndarray, " 3"], frequency: float) -> tuple[float, float]:
-    """Return by how much the two ends of the aperture lag behind its middle. [rad]."""
+    """Return the phase lags of the aperture's two ends behind its middle. [rad]."""
     positions = np.zeros((3, 3))
     positions[:, 0] = np.array([-0.5, 0.0, 0.5]) * LENGTH
     lags = []
     for share in (0, 2):
-        # Element by element from the middle to the end, no phase turns by half a cycle.
+        # From element to element the phase changes by less than half a cycle: it can be unwrapped.
         steps = np.linspace(positions[1], positions[share], 1001)
         samples = point_uplink(place[None], positions=steps, frequencies=np.array([frequency]))
         lags.append(-float(np.unwrap(np.angle(samples.samples[:, 0]))[[0, -1]] @ [-1, 1]))

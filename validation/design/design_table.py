@@ -1,4 +1,4 @@
-"""What radio, aperture and distance allow, in the units that radar engineers use."""
+"""Resolutions and limits of a radio, aperture and distance, in the units of radar engineering."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ def design_table(
     distance: float,
     angle: float = 0.0,
 ) -> tuple[DesignRow, ...]:
-    """Work the figures of a radio's design out.
+    """Compute the figures of a radio's design.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def design_table(
     distance
         Of target and user. [m]
     angle
-        Largest angle off broadside at which anything stands. [rad]
+        Largest angle of targets and users off broadside. [rad]
 
     Raises
     ------
@@ -75,7 +75,7 @@ def design_table(
     step = bandwidth / (points - 1)
     spacing = aperture_length / (elements - 1)
     middle, shortest = speed_of_light / centre, speed_of_light / stop
-    length = elements * spacing  # each element stands for one spacing
+    length = elements * spacing  # each element represents one spacing
 
     def degrees(sine: float) -> float:
         return float(np.degrees(np.arcsin(sine)))

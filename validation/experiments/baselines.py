@@ -1,13 +1,13 @@
-"""The methods of the thesis' introduction beside ours: in sight, in sight and over a wall, hidden.
+"""The methods of the thesis' introduction against ours: LoS, LoS and one wall, NLoS.
 
 Run as ``python -m validation.experiments.baselines [--quick] [FILE.png]``. A trial of all methods
 takes some 20 s on two idle cores: eighteen of them, and three with ``--quick``. The numbers
 go to a CSV file beside the figure.
 
-The thesis' introduction compares in words; each method of :mod:`validation.baselines` here hears
-the same realisation of the same room, and says in its docstring what it needs beyond ours and
-assumes. Chosen: ``los_user``, ``los_and_nlos_user`` and ``slam_2d`` as they are, each with three
-users (two of them moved, no farther aside than the image shows) and two realisations of roughness
+The thesis' introduction compares in words; here each method of :mod:`validation.baselines` gets the
+same realisation of the same room; its docstring states its additional inputs and assumptions.
+Chosen: ``los_user``, ``los_and_nlos_user`` and ``slam_2d`` unchanged, each with three users (two
+of them moved, within the imaged region) and two realisations of roughness
 and noise, 20 dB per channel sample at our array and its noise at every other receiver. *Ours* is
 the whole estimator on our echo and pilot.
 
@@ -62,31 +62,31 @@ CASES: dict[str, tuple[str, tuple[tuple[float, float], ...]]] = {
     BOTH: ("los_and_nlos_user", ((0.50, 0.75), (0.45, 0.70), (0.55, 0.80))),
     HIDDEN: ("slam_2d", ((1.00, 0.80), (0.80, 0.80), (1.10, 0.85))),
 }
-"""Scenario, and where the user stands [m]."""
+"""Scenario, and positions of the user [m]."""
 
 EXACT_IN_SIGHT = ("ToA, 4 anchors", "AoA+ToA, no map")
-"""Methods that nothing hinders in line of sight."""
+"""Methods without errors of their model in line of sight."""
 
 SURVEYED = ("RSSI/AoA fingerprints",)
 POSITIONS, SEEDS = 3, 2
 TRIALS = len(CASES) * POSITIONS * SEEDS * (len(METHODS) + 1)
 MILLIMETRE, MOST = 1e-3, 5e-3
 DECIMETRES = 0.1
-"""Error that all methods without a map exceed where the user is hidden: its image is as far
-behind the wall as it is before it. [m]"""
+"""Least error of all methods without a map in NLoS: the user's image is as far behind the wall as
+the user is in front of it. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One method's answer to one realisation."""
+    """One method's result for one realisation."""
 
     case: str
     method: str
-    x: float  # where the user stands [m]
+    x: float  # of the user [m]
     y: float
     seed: int
-    error: float | None  # None: no answer [m]
-    reason: str | None  # why there is none
+    error: float | None  # None: no position [m]
+    reason: str | None  # why there is no position
     duration: float  # [s]
 
 
@@ -98,7 +98,7 @@ def baselines(
     Parameters
     ----------
     positions, seeds
-        How many of each case's users, and how many realisations of each.
+        Numbers of each case's users, and of realisations of each.
     methods
         Names of the methods.
     """
@@ -132,7 +132,7 @@ def baselines(
 
 
 def summaries(trials: Sequence[Trial]) -> dict[tuple[str, str], ErrorSummary]:
-    """Sum up the errors of each method in each case."""
+    """Summarise the errors of each method in each case."""
     groups: dict[tuple[str, str], list[float | None]] = {}
     for trial in trials:
         groups.setdefault((trial.method, trial.case), []).append(trial.error)
@@ -140,7 +140,7 @@ def summaries(trials: Sequence[Trial]) -> dict[tuple[str, str], ErrorSummary]:
 
 
 def check(trials: Sequence[Trial]) -> list[str]:
-    """Compare with the claims; return the table's lines, or fail.
+    """Check the claims; return the table's lines.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def _cell(summary: ErrorSummary | None) -> str:
 
 
 def draw(ax: Axes, trials: Sequence[Trial], case: str) -> Axes:
-    """Draw the errors of all methods in one case, on a logarithmic axis; no answer at its end."""
+    """Draw the errors of all methods in one case, on a logarithmic axis; no position at its end."""
     methods = list(dict.fromkeys(trial.method for trial in trials))
     end = 1e4
     for row, method in enumerate(reversed(methods)):

@@ -1,11 +1,11 @@
-r"""Pilots that a beam search saves when the map predicts the channel.
+r"""Number of pilots of a beam search, with and without a channel predicted from the map.
 
 Run as ``python -m validation.experiments.beam_search_pilots [FILE.png]``.
 
-A receiver with one radio chain hears its array through one beam at a time, and spends a pilot on
-each. Users stand at 100 places of the room of ``slam_2d``: half of them are isotropic, so that the
-line of sight is strongest, half look at the wall with the 0.1 rad beam of the scenario, so that
-there is no line of sight to speak of. Three searches:
+A receiver with one radio chain measures one beam of its array at a time, and needs a pilot for
+each. Users are at 100 places of the room of ``slam_2d``: half of them are isotropic, so that the
+line of sight is strongest; half aim the 0.1 rad beam of the scenario at the wall, so that the line
+of sight is negligible. Three searches:
 
 - *exhaustive*: every beam of the codebook;
 - *hierarchical*: from 4 elements on, ever longer parts of the array, the finer beams inside the
@@ -63,16 +63,16 @@ ELEMENTS, SPACING = 260, 0.5e-3
 HALF_WALL = 0.2 / np.sqrt(2) * np.array([1.0, 1.0, 0.0])
 MIDDLE = np.array([0.0, 0.8, 0.0])
 WALL = Wall(start=MIDDLE - HALF_WALL, end=MIDDLE + HALF_WALL, covariance=np.zeros((2, 2)))
-"""Of slam_2d."""
-BEAM_SIGMA = 0.1  # of a user that looks at the wall, of the field [rad]
+"""The wall of slam_2d."""
+BEAM_SIGMA = 0.1  # of the field of a user that aims at the wall [rad]
 USERS = 100
 DEVIATIONS = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)  # of the position [m]
 SNRS_DB = (20.0, 0.0)
 LOSS_DB = 1.0
 REACH = 2.6
-"""Deviations on either side: 99 % of a Gaussian."""
+"""Standard deviations to either side: 99 % of a Gaussian. [-]"""
 MOST_CURVATURE = 2.0
-"""sin²θ/R of the nearest user. [1/m]"""
+"""Largest curvature of the codebook, sin²θ/R of the nearest user. [1/m]"""
 FIRST_ELEMENTS = 4
 LEAST_FOUND = 0.95
 
@@ -88,7 +88,7 @@ class Codebook:
 
 @dataclass(frozen=True, kw_only=True)
 class User:
-    """Where a user stands, and what each element gets of its tone."""
+    """A user's position, and the channel of its tone at each element."""
 
     position: Float[np.ndarray, " 3"]  # [m]
     channel: Complex[np.ndarray, " elements"]
@@ -96,7 +96,7 @@ class User:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """How one search does at one SNR."""
+    """Performance of one search at one SNR."""
 
     name: str
     snr_db: float
@@ -105,16 +105,16 @@ class Score:
 
 
 def element_places() -> Float[np.ndarray, " elements"]:
-    """Return where the elements are along the array. [m]."""
+    """Return the elements' positions along the array. [m]."""
     places: np.ndarray = (np.arange(ELEMENTS) - (ELEMENTS - 1) / 2) * SPACING
     return places
 
 
 def codebook(elements: int) -> Codebook:
-    """Make the beams of the middle ``elements``.
+    """Return the beams of the middle ``elements``.
 
-    Steps of λ/2d in cosθ, so that 0.9 dB are lost half way, and of 3λ/d² in the curvature: half of
-    one bends the phase at the ends by 3π/8, 0.35 rad rms, which loses 0.5 dB.
+    Steps are λ/2d in cosθ, with a loss of 0.9 dB half way, and 3λ/d² in the curvature: half of one
+    changes the phase at the ends by 3π/8, 0.35 rad rms, a loss of 0.5 dB.
     """
     length = elements * SPACING
     step = WAVELENGTH / (2 * length)
@@ -125,14 +125,14 @@ def codebook(elements: int) -> Codebook:
     pairs = np.stack(np.meshgrid(cosines, curvatures, indexing="ij"), axis=-1).reshape(-1, 2)
     places = element_places()
     used = np.abs(places) < length / 2
-    # To second order an element at x is R - x cosθ + x² sin²θ/2R away.
+    # To second order the distance of an element at x is R - x cosθ + x² sin²θ/2R.
     away = -pairs[:, :1] * places + pairs[:, 1:] * places**2 / 2
     weights = used * np.exp(-2j * np.pi * away / WAVELENGTH) / np.sqrt(used.sum())
     return Codebook(cosines=pairs[:, 0], curvatures=pairs[:, 1], weights=weights)
 
 
 def draw_users(count: int, rng: np.random.Generator) -> list[User]:
-    """Draw places in front of the wall that the whole array sees in it."""
+    """Draw users in front of the wall whose image in it is visible to the whole array."""
     places = np.zeros((ELEMENTS, 3))
     places[:, 0] = element_places()
     ends = np.stack([WALL.start, WALL.end])
@@ -140,7 +140,7 @@ def draw_users(count: int, rng: np.random.Generator) -> list[User]:
     while len(users) < count:
         spot = np.append(rng.uniform([0.2, 0.25], [1.2, 1.3]), 0.0)
         image = mirrored(spot, WALL.start, WALL.end)
-        # Where the rays from both ends of the array meet the wall's line, over its length.
+        # Points at which rays from both ends of the array meet the wall's line, over its length.
         turned = np.cross(ends - image, places[[0, -1], None] - image)[..., 2]
         inside = np.all(turned[:, 0] * turned[:, 1] < 0)
         if spot[1] - spot[0] > 0.75 or image[1] < 0.3 or not inside:
@@ -162,7 +162,7 @@ def _wave(
 
 
 def _bounce(image: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-    """Point of the wall's line, at 45°, on the way from the array's centre to an image. [m]."""
+    """Point of the wall's line, at 45°, on the path from the array's centre to an image. [m]."""
     return np.asarray(image * (MIDDLE[1] - MIDDLE[0]) / (image[1] - image[0]))
 
 
@@ -179,7 +179,7 @@ def _pattern(
 
 
 Search = Callable[[User, np.random.Generator, float], tuple[int, int]]
-"""Returns the beam of the whole codebook that was found, and the pilots spent."""
+"""Returns the beam of the whole codebook that was found, and the number of pilots."""
 
 
 def hear(
@@ -188,7 +188,7 @@ def hear(
     rng: np.random.Generator,
     noise: float,
 ) -> Float[np.ndarray, " beams"]:
-    """Return what each beam measures: unit-norm weights pass the noise of one element."""
+    """Return each beam's measured magnitude: unit-norm weights pass the noise of one element."""
     heard = weights.conj() @ user.channel
     power: np.ndarray = np.abs(heard + complex_noise(heard.shape, noise, rng)) ** 2
     return power
@@ -204,7 +204,7 @@ def exhaustive(book: Codebook) -> Search:
 
 
 def hierarchical(books: Sequence[Codebook]) -> Search:
-    """Try all beams of the shortest part, then those near the best of the part before."""
+    """Try all beams of the shortest subarray, then those near the best of the last subarray."""
     near = [_children(coarse, fine) for coarse, fine in pairwise(books)]
 
     def search(user: User, rng: np.random.Generator, noise: float) -> tuple[int, int]:
@@ -259,7 +259,7 @@ def beams_to_try(
 ) -> Int[np.ndarray, " beams"]:
     """Return the beams within REACH deviations, and half a step, of a predicted path."""
     covariance = deviation**2 * np.diag([1.0, 1.0, 0.0])
-    # What lies by a wall's end may or may not be reflected: as uncertain as the position.
+    # Near a wall's end a reflection may or may not exist, by the position's uncertainty.
     paths = predict_channel(
         position, covariance, walls, frequency=FREQUENCY, end_slack=REACH * deviation
     )
@@ -270,7 +270,7 @@ def beams_to_try(
         curvature = sine**2 / path.radius
         slopes = np.array([2 * sine * cosine / path.radius, -(sine**2) / path.radius**2])
         around = REACH * sine * np.sqrt(path.covariance[0, 0]) + wide
-        # The least and the largest curvature, the last ring of the book beyond its end.
+        # Least and largest curvature; beyond the codebook's end, its last value.
         bent = REACH * np.sqrt(slopes @ path.covariance @ slopes) + deep
         curvature = min(curvature, MOST_CURVATURE)
         allowed |= (np.abs(book.cosines - cosine) <= around) & (
@@ -280,7 +280,7 @@ def beams_to_try(
 
 
 def score(name: str, search: Search, book: Codebook, users: Sequence[User], snr_db: float) -> Score:
-    """Let a search find each user's beam."""
+    """Run a search for each user's beam."""
     rng = np.random.default_rng(1)
     spent, good = [], []
     for user in users:
@@ -328,7 +328,7 @@ def located_walls() -> tuple[Wall, ...]:
 
 
 def check(table: Sequence[Score]) -> None:
-    """Compare with the claims.
+    """Check the claims.
 
     Raises
     ------
@@ -350,7 +350,7 @@ def check(table: Sequence[Score]) -> None:
             f"{sweep.pilots:.0f}, the hierarchical one {tree.pilots:.1f}"
         )
     tree, told = by["hierarchical", low], by["10 mm", low]
-    # Both counts scatter by √(p(1-p)/n): three deviations of their difference.
+    # The standard deviation of both shares is √(p(1-p)/n): three of their difference.
     scatter = 3 * np.sqrt(2 * 0.25 / USERS)
     if told.found - tree.found < scatter:
         raise RuntimeError(

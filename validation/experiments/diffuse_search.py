@@ -10,12 +10,12 @@ of the search by diffuse scattering alone, over the walls that the estimator fou
 
 Claims that are asserted:
 
-- Where the wall scatters from all over (0.05 mm rms and more), the diffuse search finds the user
-  within 10 mm, with a path over the mirror or without: its range cell is 4 mm, and over a wall of
-  0.4 m, 1 m away, an error of distance is 7 times as large across.
-- It fails on walls that are too smooth to be lit (below 0.01 mm rms with a path, which then
-  locates the user by itself), and says so: there is no answer, not a wrong one.
-- No answer called found is off by more than its 99.9 % region.
+- If the whole wall scatters diffusely (0.05 mm rms and more), the diffuse search finds the user
+  within 10 mm, with or without a path over the mirror: its range cell is 4 mm, and over a wall of
+  0.4 m, 1 m away, an error of distance is magnified 7 times across.
+- On walls too smooth to scatter enough (below 0.01 mm rms with a path, which then locates the user
+  by itself) it returns no position, not a wrong one.
+- No position with the status found has the truth outside its 99.9 % region.
 """
 
 import sys
@@ -39,23 +39,23 @@ ANGLES_DEG = (45.0, 35.0)
 RMS_MM = (0.005, 0.02, 0.05, 0.1, 0.2, 0.4)
 CORRELATION_MM = 0.5
 ROUGH_MM = 0.05
-"""Roughness from which the wall scatters from all over. [mm]"""
+"""Least rms height at which diffuse scattering comes from the whole wall. [mm]"""
 LARGEST_ERROR = 10e-3
-"""Of the diffuse search over a rough wall. [m]"""
+"""Largest error of the diffuse search over a rough wall. [m]"""
 CONFIDENT = float(chi2.ppf(0.999, df=2))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One room, one realisation."""
+    """Result of one realisation of one room."""
 
     angle_deg: float
     rms_mm: float
     seed: int
     status: str
     method: str
-    error: float | None  # of the answer [m]
-    squared: float | None  # of the answer, over its covariance [-]
+    error: float | None  # of the estimated position [m]
+    squared: float | None  # normalised square of that error [-]
     diffuse_error: float | None  # of the diffuse search alone; None: no answer [m]
 
 

@@ -1,4 +1,4 @@
-r"""Thesis equations (2-15) to (2-28) and (3-1) to (3-3): the numbers, and what is measured of them.
+r"""Thesis equations (2-15) to (2-28) and (3-1) to (3-3): computed and measured numbers.
 
 Run as ``python -m validation.experiments.eq02_design_numbers [FILE.png]``; some seconds.
 
@@ -11,21 +11,22 @@ What the thesis leaves open, and what was chosen: which width is meant (-3 dB of
 aperture; the rounder c/2B is the distance from peak to first zero, and both are measured); the
 wavelength in a cross-range width (the band's centre); D (260 spacings).
 
-What it gets wrong, and what holds:
+Corrections:
 
 - cross-range of 11 mm at 1.8 m and 2.6 cm at 2.8 m: 0.886 λR/(nD), n = 1 for the uplink, is 14.3
-  and 20.8 mm (n = 2, for the echo, half of that). 26 mm is λR/D at about 250 GHz; 11 mm fits
-  nothing;
+  and 20.8 mm (n = 2, for the echo, half of that). 26 mm is λR/D at about 250 GHz; 11 mm agrees with
+  no formula;
 - the laboratory's 220-330 GHz are called 100 GHz with 1.5 mm of range resolution: 110 GHz, 1.36 mm;
 - 'maximum range' c/(4Δf), 1 m and 3.75 m, in section 2.4.3 c/(2Δf), 1.5 m: complex samples repeat
   every c/(2Δf), 2 m, 7.5 m and 1.5 m;
 - (2-22) asks for a spacing of λ/4 always: λ_min/(4 sin φ_max). 0.5 mm serves |sin φ| up to 0.5 at
   295 GHz;
-- (2-24): a phase of 4πR/Δλ for each frequency step, meant is 4πRΔf/c;
-- (3-3): far field R < 2D²/λ, meant is R > 2D²/λ. That is 24.8 m for 13 cm at 220 GHz: the 'far
+- (2-24): a phase of 4πR/Δλ for each frequency step should be 4πRΔf/c;
+- (3-3): far field R < 2D²/λ should be R > 2D²/λ. That is 24.8 m for 13 cm at 220 GHz: the 'far
   field' at 20 m is still radiating near field;
-- (3-1) is about one radiator; for a synthetic aperture the bound is where the wavefront's cubic
-  term reaches π/8, and nothing is reactive there.
+- (3-1) applies to a single radiator; for a synthetic aperture the bound is the distance at which
+the
+  wavefront's cubic term reaches π/8, and no field is reactive there.
 
 Claims that are asserted: each measured number is theory's.
 """
@@ -57,7 +58,7 @@ def measure() -> DesignNumbers:
 
 
 def rows(result: DesignNumbers) -> tuple[Row, ...]:
-    """State every number beside theory's and the thesis'."""
+    """Return every number with that of theory and that of the thesis."""
     return tuple(
         Row(
             name=f"{one.name}, {one.equation}",

@@ -7,13 +7,13 @@ The scenario is ``rcs_drywall``; what the thesis leaves open is in its header. T
 the same sample, smooth and of metal. The level is the mean power over the scenario's five
 frequencies from 325 to 330 GHz.
 
-Two levels have to be told apart. What a receiver *hears* is the specular lobe, as wide as two
-horns of 12.7° make it at 0.30 m (18° between its half-power directions, so that it still
-outweighs the diffuse part 25° off), and the diffuse part. The *diffuse* part is what
-roughness adds: the sample's echo less its mean, which is the smooth sample's times the coherent
-loss. Its speckle, independent from one receiver to the next (2° apart; a speckle is 0.7° wide),
-is averaged in power over all receivers 15° to 70° off the specular direction, on both sides as
-far as the arc reaches, and over four samples of drywall (seeds 0 to 3).
+Two levels are distinguished. The *received* level is that of the specular lobe, whose width is that
+of two horns of 12.7° at 0.30 m (18° between its half-power directions, so that it exceeds the
+diffuse part still at 25° off), and of the diffuse part. The *diffuse* part is caused by roughness:
+the sample's echo less its mean, which is the smooth sample's times the coherent loss. Its speckle,
+independent from one receiver to the next (2° apart; a speckle is 0.7° wide), is averaged in power
+over all receivers 15° to 70° off the specular direction, on both sides as far as the arc extends,
+and over four samples of drywall (seeds 0 to 3).
 
 Claims that are asserted:
 
@@ -51,8 +51,8 @@ CLAIMED_DB, TOLERANCE_DB = -28.0, 4.0
 MIRROR_TOLERANCE_DB = 0.1
 
 REALISATIONS = 4
-"""Samples of drywall that the diffuse power is averaged over: one alone leaves 0.7 dB of
-speckle, four leave a third of a decibel. [-]"""
+"""Samples of drywall over which the diffuse power is averaged: the error by speckle is 0.7 dB with
+one and a third of a decibel with four. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,7 @@ class Levels:
     diffuse: Float[np.ndarray, " receivers"]
     expected_metal: Float[np.ndarray, " receivers"]
     expected_diffuse: Float[np.ndarray, " receivers"]
-    realisations: int  # that the diffuse power is a mean over
+    realisations: int  # of which the diffuse power is the mean
 
     @property
     def specular(self) -> int:
@@ -74,12 +74,12 @@ class Levels:
 
     @property
     def chosen(self) -> Bool[np.ndarray, " receivers"]:
-        """Which receivers the diffuse mean is over."""
+        """Receivers over which the diffuse mean is taken."""
         off = np.abs(self.off_specular_deg)
         return np.asarray((off >= NEAREST_DEG - 1e-6) & (off <= FARTHEST_DEG + 1e-6))
 
     def diffuse_db(self, powers: Float[np.ndarray, " receivers"]) -> float:
-        """Mean of diffuse powers over the chosen receivers, over drywall's specular level."""
+        """Mean of diffuse powers of the chosen receivers, relative to drywall's specular level."""
         return float(_decibels(powers[self.chosen].mean() / self.drywall[self.specular]))
 
 
@@ -95,7 +95,7 @@ def echo_of(scenario: Scenario, seed: int) -> Complex[np.ndarray, "receivers fre
 
 
 def links_of(scenario: Scenario) -> list[Antennas]:
-    """List the links of a scenario, one for each receiver."""
+    """Return the links of a scenario, one for each receiver."""
     station = scenario.base_station
     places = station.element_positions
     senders = station.transmit_positions(places)
@@ -134,7 +134,7 @@ def measured_levels(
 ) -> Levels:
     """Simulate rough samples, the smooth one and the metal mirror, and the closed forms.
 
-    The drywall's whole level is that of the first sample, its diffuse one the mean over all.
+    The drywall's received level is that of the first sample, its diffuse one the mean over all.
     """
     smooth = override_scenario(scenario, [f"objects.{SAMPLE}.roughness.rms_mm=0"])
     metal = override_scenario(smooth, [f"objects.{SAMPLE}.material=metal"])
@@ -181,7 +181,7 @@ def _power(samples: Complex[np.ndarray, "receivers freqs"]) -> Float[np.ndarray,
 
 
 def draw(ax: Axes, levels: Levels) -> Axes:
-    """Draw the levels over the metal's specular one."""
+    """Draw the levels relative to the metal's specular one."""
     off, top = levels.off_specular_deg, levels.metal[levels.specular]
 
     def over_metal(power: Float[np.ndarray, " receivers"]) -> Float[np.ndarray, " receivers"]:
@@ -216,7 +216,7 @@ def draw(ax: Axes, levels: Levels) -> Axes:
 
 
 def rows(levels: Levels) -> tuple[Row, ...]:
-    """State the levels beside the claims."""
+    """Return the levels with their limits."""
     top = levels.specular
     mirror = float(_decibels(levels.metal[top] / levels.expected_metal[top]))
     found, expected = (levels.diffuse_db(p) for p in (levels.diffuse, levels.expected_diffuse))

@@ -7,13 +7,13 @@ The scenario is ``nlos_posts``. What the thesis leaves open, and what was chosen
 scenario's header): where wall, posts and absorber stand; the posts' radius (5 mm); the drywall's
 permittivity (ITU-R P.2040-4) and roughness (0.02 mm rms, correlation length 0.3 mm: no value is
 settled at these frequencies); noise (20 dB per channel sample). The thesis marks the mirror in the
-image by hand and turns the ghosts by 180° - 2θ about it; here the mirror is found, and its
-reflection does the same.
+image by hand and rotates the ghosts by 180° - 2θ about it; here the mirror is detected, and ghosts
+are mirrored about it, which is equivalent.
 
-What the thesis gets wrong: (2-9) to (2-14) focus with the wrong sign for exp(+jωt), and leave out
-the interpolation of wavenumbers (Stolt); the image here is formed by back-projection, which needs
-neither. A post is said to be imaged "at its place"; an image shows its front face, one radius
-nearer to the array's image in the wall.
+Corrections: (2-9) to (2-14) focus with the wrong sign for exp(+jωt), and lack the interpolation of
+wavenumbers (Stolt); the image here is formed by back-projection, which needs neither. A post is
+said to be imaged "at its place"; an image shows its front face, one radius nearer to the array's
+image in the wall.
 
 Claims that are asserted: the mirror is found; both ghosts unfold onto front faces, within 1.5 mm
 along range and a resolution cell across; no other target is within 10 dB of the weaker one.
@@ -36,7 +36,8 @@ HALF_SIZE = (
     "objects.far_post.centre_m=[0.20, 0.32]",
     "objects.far_post.radius_m=0.0025",
 )
-"""Half of all lengths, also of the array: the same resolution cells at an eighth of the work."""
+"""Overrides that halve all lengths, also the array's: the same resolution cells at an eighth of the
+work."""
 
 
 def measure(*, seed: int = 0, quick: bool = False) -> HiddenImaging:

@@ -8,10 +8,10 @@ scenario's header): where wall, box and absorber stand; the box's size (0.10 m);
 (opaque, permittivity 2.0 - 0.1j, 0.05 mm rms, correlation length 0.3 mm); the drywall as in figure
 2.10; noise (20 dB per channel sample). The mirror, marked by hand in the thesis, is found.
 
-A flat face returns a mirror-like echo from where it is met head-on, and a diffuse one from all
-over: it is imaged as a line. Its middle, as far as it is seen, is compared with the point of the
-true face that is nearest to the array's image. The estimator lists so short a face both as a target
-and, being flat, as a mirror that is seen through the wall.
+A flat face has a specular echo at normal incidence, and a diffuse one from its whole length: it is
+imaged as a line. The middle of its visible part is compared with the point of the true face that is
+nearest to the array's image. The estimator lists so short a face both as a target and, being flat,
+as a mirror seen over the wall.
 
 Claims that are asserted: the mirror is found; the face unfolds to its place, within 1.5 mm along
 range and a resolution cell across; no other target is within 10 dB of it.
@@ -33,7 +33,8 @@ HALF_SIZE = (
     "objects.box.length_m=0.05",
     "objects.box.depth_m=0.05",
 )
-"""Half of all lengths, also of the array: the same resolution cells at an eighth of the work."""
+"""Overrides that halve all lengths, also the array's: the same resolution cells at an eighth of the
+work."""
 
 
 def measure(*, seed: int = 0, quick: bool = False) -> HiddenImaging:

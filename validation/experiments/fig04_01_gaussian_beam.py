@@ -2,18 +2,18 @@ r"""Thesis figure 4.1: the pattern of the user's Gaussian beam, equation (4-1).
 
 Run as ``python -m validation.experiments.fig04_01_gaussian_beam [FILE.png]``; a second.
 
-What the thesis gets wrong: (4-1) is printed with the exponent :math:`(x-\mu)/2\sigma^2`, neither
-squared nor negative: it would grow without bound to one side. Meant is
+Correction: (4-1) is printed with the exponent :math:`(x-\mu)/2\sigma^2`, neither squared nor
+negative: it would grow without bound to one side. The intended form is
 
 .. math:: g(\psi) = e^{-(\psi - \mu)^2 / 2 \sigma^2} .
 
-Left open there, chosen here: a standard width of 0.1 rad, as in the scenarios; that it is the width
-of the field, not of the power (that would be √2 narrower); a peak of 0 dBi, so that the beam's
-width does not change the level on its axis; that μ is where the beam is aimed.
+Left open there, chosen here: a standard width of 0.1 rad, as in the scenarios, of the field, not of
+the power (that would be √2 narrower); a peak of 0 dBi, so that the beam's width does not change the
+level on its axis; μ is the direction of the aim.
 
-What is simulated: the uplink of ``near_field_user`` without noise, its user moved to 0.15 m from
-the array's centre, where 13 cm of array look at more than four standard widths to either side. What
-an element receives, times 4πR/λ, is the pattern in its direction.
+Simulated is the uplink of ``near_field_user`` without noise, with the user at 0.15 m from the
+array's centre, where the array of 13 cm covers more than four standard widths to either side. An
+element's signal times 4πR/λ is the pattern in its direction.
 
 Claims that are asserted: that is (4-1) as corrected, over 70 dB; the half-power width is
 twice √(ln 2) standard widths, 9.54°; the beam is even about its aim.
@@ -41,12 +41,13 @@ ACCURACY = 1e-9
 """Largest error of the field over its closed form: double precision over a geometry of 0.15 m.
 [-]"""
 WIDTH_ACCURACY = 1e-3
-"""Of the half-power width: interpolated between elements 0.19° apart, a fiftieth of it. [-]"""
+"""Largest relative error of the half-power width, which is interpolated between elements 0.19°
+apart, a fiftieth of it. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BeamPattern:
-    """The simulated beam over the angle off its aim, beside the closed form."""
+    """The simulated beam over the angle off its aim, and the closed form."""
 
     off_axis: Float[np.ndarray, " elements"]  # signed [rad]
     simulated: Float[np.ndarray, " elements"]  # field over an isotropic antenna's [-]
@@ -57,12 +58,12 @@ class BeamPattern:
 
     @property
     def worst_error(self) -> float:
-        """Largest error over the closed form. [-]."""
+        """Largest error relative to the closed form. [-]."""
         return float(np.max(np.abs(self.simulated / self.closed_form - 1)))
 
     @property
     def unevenness_db(self) -> float:
-        """Largest difference between the two sides."""
+        """Largest difference between the two sides. [dB]."""
         return float(np.max(np.abs(20 * np.log10(self.simulated / self.simulated[::-1]))))
 
 
@@ -100,7 +101,7 @@ def measure() -> BeamPattern:
 
 
 def rows(result: BeamPattern) -> tuple[Row, ...]:
-    """State the figures beside the claims."""
+    """Return the figures with their limits."""
     width = float(np.degrees(2 * result.sigma * np.sqrt(np.log(2))))
     floor_db = float(20 * np.log10(result.closed_form.min()))
     return (

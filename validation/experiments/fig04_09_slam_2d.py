@@ -11,7 +11,7 @@ beam (0.1 rad); noise (20 dB per channel sample; the thesis' solver has none); t
 (220 GHz, the band's first, as in its figures 4.3 to 4.7); which width a resolution is (-3 dB). The
 thesis marks the mirror by hand and shows one case; here the mirror is found, over ten realisations.
 
-What it gets wrong: its 11 mm of cross-range at 1.8 m; 0.886 λR/D is 14.3 mm. (3-8) needs a minus
+Corrections: the cross-range of 11 mm at 1.8 m should be 0.886 λR/D = 14.3 mm; (3-8) needs a minus
 before 2dR cos θ, and (3-4) to (3-10) the other sign of the phase.
 
 Claims that are asserted: the angle at one frequency; the map's -3 dB widths are theory's; the
@@ -57,13 +57,16 @@ HALF_SIZE = (
     "objects.wall.length_m=0.2",
     "users.user.position_m=[0.5, 0.4]",
 )
-"""Half of all lengths, also of the array: the same resolution cells at a quarter of the work."""
+"""Overrides that halve all lengths, also the array's: the same resolution cells at a quarter of the
+work."""
 ANGLE_LIMIT = np.radians(0.03)
-"""Of the angle at one frequency: the roughness' floor of 0.44 mm (the worst of 40 realisations over
-the whole band) is 0.014° at 1.8 m, and one frequency has no band to average it over. [rad]"""
+"""Largest error of the angle at one frequency: the error by roughness of 0.44 mm (the worst of 40
+realisations over the whole band) is 0.014° at 1.8 m, and at one frequency it is not averaged over
+the band. [rad]"""
 WALL_ANGLE, WALL_OFFSET = WORST / 2 / 1.0, WORST / 2
-"""Of the wall: what alone would use the worst error up, twice the angle times 1 m behind it; and
-half of it, for an offset moves the user by √2 as much. [rad], [m]"""
+"""Largest errors of the wall: that of the angle alone would cause the worst position error, twice
+the angle times 1 m behind it; that of the offset half of it, as it moves the user by √2 as much.
+[rad], [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,13 +103,13 @@ def measure(
     Parameters
     ----------
     seed
-        The first.
+        First seed.
     seeds
-        How many; ``None``: ten, or three in the quick form.
+        Number of seeds; ``None``: ten, or three in the quick form.
     quick
         Whether all lengths are halved.
     tell
-        Told each realisation.
+        Called after each realisation.
     """
     count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
     scenario = load_scenario("slam_2d", HALF_SIZE if quick else ())
@@ -149,7 +152,7 @@ def spectrum_at_one_frequency(uplink: Uplink, trial: UserTrial) -> OneFrequency:
 
 
 def rows(result: Slam2d) -> tuple[Row, ...]:
-    """State the figures beside the claims."""
+    """Return the figures with their limits."""
     first = result.spectra[0]
     width = float(np.degrees(first.theory))
     widths = [float(np.degrees(one.peak.width)) for one in result.spectra]
@@ -214,7 +217,7 @@ def draw(figure: Figure, result: Slam2d) -> None:
     )
     ax.legend(fontsize=8)
     bright = views.bright_points(image)
-    # As wide as the plan below it, to be compared.
+    # As wide as the plan below it, for comparison.
     shown = [views.estimate_points(estimate, positions), bright]
     view = views.view_around(np.concatenate(shown))
     figures_2d.draw_image(axes[0, 1], image, view=view)

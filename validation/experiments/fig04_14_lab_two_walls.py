@@ -10,11 +10,11 @@ roughness (0.02 mm rms, correlation length 0.3 mm); one antenna for each positio
 horns side by side; where the absorber stands; noise (20 dB per channel sample). The thesis measured
 one case and marked both mirrors by hand; here they are found.
 
-What it gets wrong: 220-329.98 GHz are 110 GHz, not 100, and resolve 1.36 mm, not 1.5 mm; its 2.6 cm
-of cross-range at 2.8 m are 0.886 λR/D = 20.8 mm.
+Corrections: 220-329.98 GHz are 110 GHz, not 100, and resolve 1.36 mm, not 1.5 mm; the cross-range
+of 2.6 cm at 2.8 m should be 0.886 λR/D = 20.8 mm.
 
-There is no quick form: at half the size the second wall is resolved half as well over its length,
-and the claims would be others.
+There is no quick form: at half the size the second wall has half as many resolution cells along its
+length, and the claims would differ.
 
 Claims that are asserted: both walls at their true place, the second one first at its ghost's,
 behind the first, and then unfolded; the map's -3 dB widths are theory's; the user within 3 mm in
@@ -47,9 +47,9 @@ from validation.trials.hidden_user import (
 WALLS = ("drywall_1", "drywall_2")
 MEDIAN, WORST = 3e-3, 5e-3
 BEHIND = (1.98, 1.08)
-"""Length of the way that is left after each wall. [m]"""
+"""Length of the remaining path behind each wall. [m]"""
 OFFSET = 1.36e-3
-"""Of the walls: the null-to-peak range cell c/2B, by which an image places a line. [m]"""
+"""Largest offset of the walls: the null-to-peak range cell c/2B of the image. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +66,11 @@ def measure(*, seed: int = 0, seeds: int = 1, tell: Tell | None = None) -> LabTw
     Parameters
     ----------
     seed
-        The first.
+        First seed.
     seeds
-        How many.
+        Number of seeds.
     tell
-        Told each realisation.
+        Called after each realisation.
     """
     scenario = load_scenario("lab_two_walls")
     trials: list[UserTrial] = []
@@ -83,7 +83,7 @@ def measure(*, seed: int = 0, seeds: int = 1, tell: Tell | None = None) -> LabTw
 
 
 def rows(result: LabTwoWalls) -> tuple[Row, ...]:
-    """State the figures beside the claims."""
+    """Return the figures with their limits."""
     angles = [MEDIAN / (2 * length) for length in BEHIND]
     origin = "turns the user by 3 mm over the way behind it; range cell c/2B"
     ghost = "as the first wall's angle, which mirrors it; two range cells"

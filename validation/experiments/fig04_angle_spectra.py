@@ -6,8 +6,8 @@ Parameters of the thesis: 260 elements 0.5 mm apart, 220 GHz, a user at 1.8 m an
 90° and 70°. Left open there, chosen here: no noise, an isotropic user, a grid of 0.001°.
 
 Claims that are asserted: the spherical model finds 90° and 70° at 1.8 m within 0.01°; at 20 m
-both models find them within 0.01°. What the plane-wave model gets wrong at 1.8 m is drawn: its
-main lobe is over two degrees wide, peaks 0.6° off, and is far below the amplitude 1.
+both models find them within 0.01°. The error of the plane-wave model at 1.8 m is drawn: its main
+lobe is over two degrees wide, its peak is 0.6° off, and far below the amplitude 1.
 """
 
 import sys
@@ -26,7 +26,7 @@ FREQUENCY = 220e9
 ELEMENTS = 260
 SPACING = 0.5e-3
 TOLERANCE_DEG = 0.01
-"""Farthest peak off the truth: an 18th of the thesis' grid of 0.18°. [°]"""
+"""Largest error of a peak: an 18th of the thesis' grid of 0.18°. [°]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class Spectra:
     plane: Float[np.ndarray, " angles"]
 
     def error_deg(self, spectrum: Float[np.ndarray, " angles"]) -> float:
-        """Return by how far a spectrum's peak misses the user, in degrees."""
+        """Return the distance of a spectrum's peak from the user, in degrees."""
         return float(abs(self.grid_deg[spectrum.argmax()] - self.aoa_deg))
 
 
@@ -82,12 +82,12 @@ def draw(ax: Axes, spectra: Spectra) -> Axes:
 
 
 def check(spectra: Spectra) -> str:
-    """Compare with the thesis' claim; return a line, or fail.
+    """Check the thesis' claim; return a line of text.
 
     Raises
     ------
     RuntimeError
-        If a model that should find the user misses it.
+        If the peak of a model that is valid there is not at the user.
     """
     near, plane = spectra.error_deg(spectra.spherical), spectra.error_deg(spectra.plane)
     if near > TOLERANCE_DEG or (spectra.distance > 10 and plane > TOLERANCE_DEG):

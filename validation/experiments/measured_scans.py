@@ -1,11 +1,11 @@
-"""Falsehoods in scans of things that are no rooms: certain mirrors, and targets where nothing is.
+"""False mirrors and false targets in scans of scenes without walls.
 
-Run as ``python -m validation.experiments.measured_scans [DRAWS] [FIRST]``: so many draws of each
-kind (:mod:`validation.trials.measured_scans`), with a linear and a planar array, from a seed on.
+Run as ``python -m validation.experiments.measured_scans [DRAWS] [FIRST]``: number of draws of each
+kind (:mod:`validation.trials.measured_scans`), with a linear and a planar array, and first seed.
 
 Not in the thesis. Claim that is asserted: no mirror has a confidence above 0.99, in scans without a
-wall. Targets are counted, within 10 dB of the strongest and farther than three cells from all
-scatterers: that is told, not asserted. Seeds below 1000 served for choosing; judge on others.
+wall. Targets within 10 dB of the strongest and farther than three cells from all scatterers are
+counted: this is printed, not asserted. Seeds below 1000 were used for tuning; judge on others.
 """
 
 import sys
@@ -20,15 +20,15 @@ from validation.trials.measured_scans import KINDS, DrawnScan, drawn_scan
 DRAWS = 30
 FIRST = 1000
 CERTAIN = 0.99
-"""Confidence above which a mirror is a falsehood. [-]"""
+"""Confidence above which a mirror counts as false. [-]"""
 FAINTEST_DB = -10.0
-"""Level over the strongest target's from which a false one counts. [dB]"""
+"""Least level of a counted false target, relative to the strongest target. [dB]"""
 CELLS = 3.0
-"""Distance from all scatterers at which a target is false. [cells]"""
+"""Distance from all scatterers above which a target is false. [cells]"""
 
 
 def false_targets(scan: DrawnScan, estimate: Estimate) -> int:
-    """Count targets where nothing is."""
+    """Count the targets far from all scatterers."""
     if not estimate.targets or scan.measurement.echo is None:
         return 0
     strongest = max(target.level_db or -np.inf for target in estimate.targets)
@@ -44,7 +44,7 @@ def false_targets(scan: DrawnScan, estimate: Estimate) -> int:
 
 
 def main(draws: int = DRAWS, first: int = FIRST) -> int:
-    """Print what was found of each kind; return the number of falsehoods that are asserted."""
+    """Print the counts of each kind; return the number of false mirrors."""
     certain_all = 0
     print("kind        array   scans  certain mirrors  other mirrors  with target  false targets")
     for kind in KINDS:

@@ -6,19 +6,17 @@ on two cores, with ``--quick`` one. The numbers go to a CSV file beside the figu
 Not in the thesis, which states no bound. Chosen:
 
 - *Free space*: the closed-form pilot of :mod:`validation.analytic.point_scatterer`, direct (70°)
-and
-  over one known mirror of 45° (image at 80°); 64 elements of 0.5 mm, 220 to 295 GHz in steps of
-  0.25 GHz, 0.6 m of path, 10 dB per channel sample; of SNR, bandwidth, aperture and distance one
-  is swept.
-  Whoever is measured knows nothing: the path search of `locate` starts from the whole map.
+  and over one known mirror of 45° (image at 80°); 64 elements of 0.5 mm, 220 to 295 GHz in steps of
+  0.25 GHz, 0.6 m of path, 10 dB per channel sample; one of SNR, bandwidth, aperture and distance is
+  swept. The estimator has no prior knowledge: the path search of `locate` starts from the whole
+  map.
 - *Rough wall*: ``slam_2d`` at half its size (128 elements, 401 frequencies, a wall of 20 cm 0.4 m
-  away; fewer frequencies do not image its far end at 0.48 m unambiguously, and the bound counts
-  on all of the wall), roughness and noise drawn anew for each trial. With the wall known the
-  strongest path is unfolded over the true mean plane; with the wall estimated the whole estimator
-  answers. What it is held against is the root of the sum of squares of the bound (noise, wall
-  known), of the floor of :mod:`validation.bounds.roughness_floor`, and, with the wall estimated, of
-  what
-  :mod:`validation.bounds.wall_bound` leaves of the wall's place.
+  away; with fewer frequencies its far end at 0.48 m is not unambiguous, and the bound assumes the
+  whole wall), roughness and noise drawn anew for each trial. With the wall known the strongest path
+  is unfolded over the true mean plane; with the wall estimated the whole estimator is run. Errors
+  are compared with the root of the sum of squares of the bound (noise, wall known), of the floor of
+  :mod:`validation.bounds.roughness_floor`, and, with the wall estimated, of the error by the wall's
+  covariance of :mod:`validation.bounds.wall_bound`.
 
 Claims that are asserted: the rms error is within a factor of 1.5 of the bound from 0 dB upward, in
 every sweep of free space, and below it by no more than trial scatter (four standard deviations of
@@ -62,16 +60,17 @@ coordinate scatters by 1/√20 = 22 %, twice of which is within this. [-]"""
 ESTIMATED_FACTOR = 2.5
 """The same with the wall estimated, whose bound counts speckle alone: 2.1 over 5 µm of rms. [-]"""
 LEAST_SNR_DB = 0.0
-"""Level of noise from which on this is claimed; below it, the search loses the wave. [dB]"""
+"""Least SNR for which this is claimed; below it, the search may not detect the wave. [dB]"""
 
 CLOSED_WITHIN = 0.02
-"""How far two forms of the bound of a lone wave may differ: the pilot falls as 1/f over the band,
-that of the closed form does not, which is (B/f)²/6, 1.4 %, of the widest one. [-]"""
+"""Largest difference between two forms of the bound of a single wave: the pilot's amplitude falls
+as 1/f over the band, that of the closed form is constant, which gives (B/f)²/6 = 1.4 % for the
+widest band. [-]"""
 
 STEP = 0.25e9
 """Frequency step: unambiguous to 1.2 m of path. [Hz]"""
 FINE_STEP = 0.1e9
-"""The same of the sweep of distance: 3 m. [Hz]"""
+"""The same in the sweep of distance: unambiguous to 3 m. [Hz]"""
 
 HALF_SIZE = (
     "base_station.elements=128",
@@ -84,14 +83,14 @@ HALF_SIZE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Trials at one setting, beside the theory."""
+    """Errors of trials at one setting, with the theoretical ones."""
 
     sweep: str
     case: str
-    value: float  # of what is swept, in the sweep's unit
+    value: float  # of the swept parameter, in its unit
     snr_db: float
     bound: float  # position error bound, mirrors known [m]
-    expected: float  # with the floors that noise does not lower [m]
+    expected: float  # with the errors that do not depend on noise [m]
     measured: float  # rms of the distance from the truth [m]
     median: float  # [m]
     answered: int
@@ -105,13 +104,13 @@ class Comparison:
 
     @property
     def scatter(self) -> float:
-        """Standard deviation of the ratio, were all error along one coordinate. [-]."""
+        """Standard deviation of the ratio, if all error is along one coordinate. [-]."""
         return float(1 / np.sqrt(2 * self.trials))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How much is run."""
+    """Amount of work: values of the sweeps and numbers of trials."""
 
     trials: int
     realisations: int
@@ -123,7 +122,7 @@ class Effort:
 
     @property
     def comparisons(self) -> int:
-        """How many comparisons that makes."""
+        """Number of comparisons."""
         free = sum(map(len, (self.snr_db, self.bandwidth, self.elements, self.distance)))
         return 2 * free + len(self.snr_db) + 2 * len(self.rms)
 
@@ -149,7 +148,7 @@ QUICK = Effort(
 
 
 def position_bounds(effort: Effort = FULL) -> Iterator[Comparison]:
-    """Run all sweeps; yields each comparison as it is known."""
+    """Run all sweeps; yield each comparison when it is done."""
     trials = effort.trials
     for mirrored in (False, True):
         for snr in effort.snr_db:
@@ -181,11 +180,11 @@ def free_space(
     Parameters
     ----------
     mirrored
-        Whether the user is heard over the mirror alone.
+        Whether the pilot arrives over the mirror alone.
     trials
         Draws of noise and of the gain's phase.
     sweep
-        Which of the following the comparison is filed under.
+        Name of the sweep, one of the following parameters.
     snr_db, bandwidth, elements, distance, step
         Of the radio [dB], [Hz], [-], of the path [m], and of the sweep [Hz].
     """
@@ -230,7 +229,7 @@ def free_space(
         expected=bound,
         errors=errors,
     )
-    # A flat mirror that is known only moves the image: the bound is that of angle and length.
+    # A known flat mirror only moves the image: the bound is that of angle and length.
     polar = cramer_rao_bound(
         aoa=float(aoa), path_length=distance, snr=snr, positions=positions, frequencies=frequencies
     )
@@ -239,7 +238,7 @@ def free_space(
 
 
 def rough_wall_over_snr(snr_db: Sequence[float], realisations: int) -> list[Comparison]:
-    """Locate over a rough wall that is known, at several levels of noise on the same pilots."""
+    """Locate over a known rough wall, at several SNRs of the same pilots."""
     scenario = load_scenario("slam_2d", HALF_SIZE)
     floor = roughness_floor(scenario, "user", "wall").deviation
     pilots = [_noise_free_pilot(scenario, seed) for seed in range(realisations)]
@@ -264,7 +263,7 @@ def rough_wall_over_snr(snr_db: Sequence[float], realisations: int) -> list[Comp
 
 
 def rough_wall_over_height(rms: float, realisations: int) -> list[Comparison]:
-    """Locate over a wall of an rms height at 20 dB, with the wall known and estimated."""
+    """Locate over a wall of given rms height at 20 dB, with the wall known and estimated."""
     scenario = load_scenario("slam_2d", (*HALF_SIZE, f"objects.wall.roughness.rms_mm={1e3 * rms}"))
     floor = roughness_floor(scenario, "user", "wall").deviation
     snr_db = scenario.noise.snr_db
@@ -324,10 +323,10 @@ def _compared(
 def _path_error(
     pilot: Uplink, user: Float[np.ndarray, " 3"], planes: Sequence[Plane]
 ) -> float | None:
-    """Take a pilot's strongest path, unfold it, and compare; None if none stands out of the noise.
+    """Return the error of a pilot's strongest path, unfolded; None if no path is detected.
 
-    The stage is that of :func:`estimator.localization.pipeline.locate`: the same map of the same
-    angles and lengths, the same search, the same fit. The wall alone is given.
+    Map, search and fit are those of :func:`estimator.localization.pipeline.locate`; only the wall
+    is given.
     """
     heard = LinearStages().hear(pilot, clock_known=True).paths.paths
     if not heard:
@@ -368,7 +367,7 @@ def _wall_plane(scenario: Scenario) -> Plane:
 
 
 def check(comparisons: Sequence[Comparison]) -> list[str]:
-    """Compare with the claims; return a line for each comparison, or fail.
+    """Check the claims; return a line for each comparison.
 
     Raises
     ------
@@ -411,7 +410,7 @@ COLOURS = {
 
 
 def draw(ax: Axes, comparisons: Sequence[Comparison], sweep: str) -> Axes:
-    """Draw one sweep: what is measured as marks, what is expected as lines, the bound dotted."""
+    """Draw one sweep: measured errors as marks, expected ones as lines, the bound dotted."""
     for case, colour in COLOURS.items():
         chosen = [one for one in comparisons if (one.sweep, one.case) == (sweep, case)]
         if not chosen:

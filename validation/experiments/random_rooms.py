@@ -1,13 +1,13 @@
-"""How the estimator fares in rooms that nobody drew.
+"""Performance of the estimator in rooms drawn at random.
 
 Run as ``python -m validation.experiments.random_rooms [--set plain] [--rooms 40] [--first 0]
 [--tuning] [--workers 1] [--keep DIR] [--out FILE.json] [--write NUMBER FILE.toml]``.
 
-Not in the thesis, which has one room of its own. :mod:`validation.random_rooms.prior` tells the
-prior, :mod:`validation.random_rooms.oracle` what could be answered; rooms for judging are never
-tuned on, and ``--tuning`` takes others. Each room is one line; a table of all ends the run.
-``--keep`` keeps the simulated measurements, so that another estimator is judged by the same ones;
-``--out`` keeps the scores; ``--write`` writes one room as a scenario file and ends.
+Not in the thesis, which has a single room. :mod:`validation.random_rooms.prior` defines the prior,
+:mod:`validation.random_rooms.oracle` which rooms can be answered. Rooms for judging are never used
+for tuning; ``--tuning`` selects a separate set. The output has a line for each room and a table.
+``--keep`` stores the simulated measurements, so that other versions of the estimator are judged by
+the same ones; ``--out`` stores the scores; ``--write`` writes one room as a scenario file and ends.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from validation.random_rooms.room_summary import summarise, table_rows
 
 
 def score_line(score: RoomScore) -> str:
-    """Describe one room in a line."""
+    """Return the line of one room."""
     error = "" if score.error is None else f" {1e3 * score.error:.3g} mm"
     square = "" if score.square is None else f", e'C⁻¹e {score.square:.3g}"
     walls = f"walls {len(set(score.shown) & set(score.found))}/{len(score.shown)} shown"

@@ -8,12 +8,12 @@ surfaces", Commun. Pure Appl. Math. 4 (1951) 351) give the backscatter of a slig
 with the spectrum :math:`W` of the heights (its integral over the plane of wavenumbers is the mean
 square height), :math:`\alpha_h = R_{TE}`, :math:`\alpha_v = (\varepsilon - 1)(\sin^2\theta -
 \varepsilon (1 + \sin^2\theta)) / (\varepsilon \cos\theta + \sqrt{\varepsilon - \sin^2\theta})^2`;
-for a conductor -1 and :math:`-(1 + \sin^2\theta) / \cos^2\theta`. Here it is measured as one
-would in an anechoic chamber: echoes from azimuths around plates of a few square centimetres, the
-mean over plates (edges) taken out.
+for a conductor -1 and :math:`-(1 + \sin^2\theta) / \cos^2\theta`. Here it is measured as in an
+anechoic chamber: echoes from azimuths around plates of a few square centimetres, less their mean
+over plates (which removes the edges).
 
-Energy: what a lossless plate scatters diffusely into all directions and both polarizations, and
-what roughness leaves of its mirror's power, are together what came in.
+Energy: for a lossless plate, the diffusely scattered power in all directions and both
+polarizations, and the specular power after the loss by roughness, add up to the incident power.
 """
 
 import math
@@ -38,14 +38,14 @@ from simulator.visibility.seen import Seen
 
 FREQUENCY = 250e9  # [Hz]
 SIDE = 12e-3  # of the plate: ten wavelengths [m]
-DISTANCE = 1.0  # of the antennas: the plate is seen within 0.7° [m]
-STEPS_PER_LENGTH = 6  # facets per correlation length: flat ones lose 0.15 dB at 60° [-]
+DISTANCE = 1.0  # of the antennas: the plate subtends 0.7° [m]
+STEPS_PER_LENGTH = 6  # facets per correlation length: the loss by flat facets is 0.15 dB at 60° [-]
 DRYWALL = 2.56 - 0.13j
 """Relative permittivity of plasterboard at 250 GHz, ITU-R P.2040-4. [-]"""
 
 UPRIGHT = Polarization()
 ACROSS = Polarization(cross_polar=1e9)
-"""Field across that of a vertical antenna, in any direction: the horizontal one."""
+"""Field perpendicular to that of a vertical antenna in any direction: horizontal."""
 
 MATERIALS: dict[str, Material] = {
     "conductor": Conductor(),
@@ -54,7 +54,7 @@ MATERIALS: dict[str, Material] = {
 
 
 def plate(roughness: Roughness, seed: int) -> Surface:
-    """Make a plate that faces +z."""
+    """Return a rough plate that faces +z."""
     count = 1 + math.ceil(SIDE * STEPS_PER_LENGTH / roughness.correlation_length)
     heights = rough_sheet(
         lengths=(SIDE, SIDE),
@@ -104,7 +104,7 @@ def links(
 
 
 def around(degrees: float, count: int) -> Float[np.ndarray, "azimuths 3"]:
-    """Place antennas at one angle off the plate's normal, at all azimuths."""
+    """Return antenna positions at one angle off the plate's normal, at all azimuths."""
     turns = 2 * np.pi * (np.arange(count) + 0.3) / count
     angle = math.radians(degrees)
     flat = math.sin(angle) * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
@@ -142,7 +142,7 @@ class Backscatter:
     polarization: str
     degrees: float
     over_theory: float  # [dB]
-    error: float  # counting error, one standard deviation [dB]
+    error: float  # statistical error, one standard deviation [dB]
 
 
 def backscatter(plates: int, azimuths: int) -> list[Backscatter]:
@@ -162,7 +162,7 @@ def backscatter(plates: int, azimuths: int) -> list[Backscatter]:
                 power = float(np.var(echoes, axis=0, ddof=1).mean())
                 level = power * (4 * math.pi) ** 3 * DISTANCE**4 / (wavelength * SIDE) ** 2
                 theory = small_perturbations(name, polarization, degrees, roughness)
-                # Speckle lasts λ / 2D sinθ along the azimuth.
+                # The width of speckle along the azimuth is λ / 2D sinθ.
                 apart = wavelength / (2 * SIDE * math.sin(math.radians(degrees)))
                 independent = min(azimuths, 2 * math.pi / apart) * (plates - 1)
                 found.append(
@@ -179,7 +179,7 @@ def backscatter(plates: int, azimuths: int) -> list[Backscatter]:
 
 @dataclass(frozen=True, kw_only=True)
 class Energy:
-    """Where the power goes that meets a rough conducting plate, over that which came in."""
+    """Specular and diffuse power of a rough conducting plate, over the incident power."""
 
     polarization: str
     mirrored: float  # [-]
@@ -187,12 +187,12 @@ class Energy:
 
     @property
     def whole(self) -> float:
-        """All of it. [-]."""
+        """Sum of both. [-]."""
         return self.mirrored + self.diffuse
 
 
 def energy(plates: int, directions: int, roughness: Roughness, degrees: float) -> list[Energy]:
-    """Add up what a rough conducting plate scatters.
+    """Sum the power scattered by a rough conducting plate.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def energy(plates: int, directions: int, roughness: Roughness, degrees: float) -
     wavelength = speed_of_light / FREQUENCY
     sender = DISTANCE * np.array([math.sin(math.radians(degrees)), 0.0, 0.0])
     sender[2] = math.sqrt(DISTANCE**2 - sender[0] ** 2)
-    # Equal solid angles: a Fibonacci spiral over the half space; the mirror's direction first.
+    # Equal solid angles: a Fibonacci spiral over the half space; the specular direction first.
     order = np.arange(directions) + 0.5
     up, turn = order / directions, np.pi * (1 + 5**0.5) * order
     flat = np.sqrt(1 - up**2)

@@ -2,7 +2,7 @@
 
 Run as ``python -m validation.experiments.simulator_on_points [FILE.png]``; some seconds.
 
-Not a figure of the thesis; what all of its equations rest on. The closed form
+Not a figure of the thesis, but the basis of all of its equations. The closed form
 (:mod:`validation.analytic.point_scatterer`) shares no code with either: the radar equation for the
 echo, Friis' equation for the uplink, and a Hankel function for that of a line source.
 
@@ -39,17 +39,18 @@ from validation.harness.row_table import conclude_with_figure
 from validation.metrics.point_response import peak_cut
 
 CELLS_OFF = 0.05
-"""Farthest peak off its point, over the range cell: noise moves it by 0.04 of a cell where the
-focused point stands 20 dB out of it, √12/(2π√(2·SNR)) after Cramér-Rao. [-]"""
+"""Largest distance of a peak from its point, over the range cell: at 20 dB SNR of the focused
+point, the Cramér-Rao bound √12/(2π√(2·SNR)) is 0.04 of a cell. [-]"""
 WIDTHS_WITHIN = 0.05
-"""Largest relative error of -3 dB widths: the formulas are of a narrow band, that is 29 %. [-]"""
+"""Largest relative error of -3 dB widths: the formulas are for a narrow band, this one is 29 %.
+[-]"""
 PHASE_DEG = 5.0
-"""Largest error of phase: noise turns one sample at 20 dB by 1/√(2·SNR), 4°. [°]"""
+"""Largest error of phase: that of one sample at 20 dB is 1/√(2·SNR), 4°. [°]"""
 LEVEL_DB = 0.2
-"""Largest error of level: a third of what noise changes one sample at 20 dB by. [dB]"""
+"""Largest error of level: a third of that of one sample at 20 dB SNR. [dB]"""
 SIMULATOR_WITHIN = 1e-9
 """Largest error of a simulated channel over the largest sample: double precision (1e-16) of phases
-of 2e3 turns, with room for their summation. [-]"""
+of 2e3 cycles, with a margin for their summation. [-]"""
 LINE = (
     np.array([0.0, 0.5, 0.0]),
     np.array([0.15, 0.7, 0.0]),
@@ -73,7 +74,7 @@ class PointImage:
 
     case: str
     place: Float[np.ndarray, " 3"]  # [m]
-    cells_off: float  # worst over the axes, over the -3 dB cell [-]
+    cells_off: float  # largest over the axes, relative to the -3 dB cell [-]
     width_errors: tuple[float, ...]  # relative to theory, range first [-]
     phase_error: float  # at the point [rad]
     level_error_db: float  # at the point, over the amplitude there [dB]
@@ -82,12 +83,12 @@ class PointImage:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelError:
-    """A simulated channel beside its closed form."""
+    """Error of a simulated channel against its closed form."""
 
     case: str
     error: float  # largest, over the largest sample [-]
-    within: float = SIMULATOR_WITHIN  # claimed [-]
-    origin: str = "double precision of 2e3 turns"  # of that
+    within: float = SIMULATOR_WITHIN  # limit [-]
+    origin: str = "double precision of 2e3 turns"  # of the limit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +153,7 @@ def _image(
         for axis in (0, 2):  # the aperture's own axes, less their part along the range
             across = np.eye(3)[axis] - along[axis] * along
             directions.append(across / np.linalg.norm(across))
-            # The spread of the aperture's directions on that axis, both of its ends included.
+            # The range of the aperture's directions along that axis.
             ends = np.unique(positions[:, axis])
             rays = point - np.outer(ends, np.eye(3)[axis])
             rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
@@ -194,9 +195,9 @@ def _simulated_line() -> list[ChannelError]:
 
 
 def _cylindrical_uplink() -> ChannelError:
-    """Simulate the uplink of a line source, the exact field of which is a Hankel function.
+    """Simulate the uplink of a line source, whose exact field is a Hankel function.
 
-    In these waves a point has no radar cross-section, so that there is no echo to compare.
+    For cylindrical waves a point has no radar cross-section, so there is no echo to compare.
     """
     overrides = ("waves=cylindrical", "radio.points=21", "noise.snr_db=inf")
     scenario = load_scenario("near_field_user", overrides)
@@ -246,7 +247,7 @@ def _simulated(
         frequencies=frequencies,
         radar_cross_section=sections,
     )
-    # A pilot comes directly, and over each point as an echo with the user for transmitter.
+    # A pilot arrives directly, and over each point as a bistatic echo of the user.
     over_points = point_echo(
         targets,
         positions=positions,
@@ -272,7 +273,7 @@ def _error(ours: Complex[np.ndarray, "*n"], theirs: Complex[np.ndarray, "*n"]) -
 
 
 def rows(results: PointResults) -> tuple[Row, ...]:
-    """State the worst of all points beside the claims."""
+    """Return the largest errors of all points, with their limits."""
     table: list[Row] = []
     for case in dict.fromkeys(image.case for image in results.images):
         images = [image for image in results.images if image.case == case]
@@ -327,7 +328,7 @@ def rows(results: PointResults) -> tuple[Row, ...]:
 
 
 def draw(figure: Figure, results: PointResults) -> None:
-    """Draw the cuts of all points over their cells, beside theory's."""
+    """Draw the cuts of all points over their cells, with the theoretical ones."""
     axes = figure.subplots(1, 2, sharey=True)
     theory = np.abs(np.sinc(HALF_POWER * _SAMPLES))
     for ax, chosen, title in (

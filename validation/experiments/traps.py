@@ -1,11 +1,11 @@
-"""Rooms that invite a confident wrong answer, and what each gives.
+"""Rooms prone to confidently wrong answers, and the estimator's answers.
 
 Run as ``python -m validation.experiments.traps [SEEDS [TRAP …]]``.
 
-Not in the thesis, which knows its one wall beforehand. Each trap is a room in two dimensions
-with walls and users where a careless estimator unfolds a path that is direct, takes a wall for
-another, a ghost for a wall, an edge for a user, or a bent wave for a mirror's. The rooms are those
-of :mod:`validation.trials.trap_rooms`.
+Not in the thesis, whose one wall is known beforehand. Each trap is a room in two dimensions with
+walls and users in which an estimator may unfold a direct path, take a wall for another, a ghost for
+a wall, an edge for a user, or a wave from a convex body for that of a plane mirror. The rooms are
+those of :mod:`validation.trials.trap_rooms`.
 
 Claims that are asserted, for every trap and seed: no answer that is called ``found`` has the
 truth outside its 99.9 % region (χ² with two degrees of freedom), and no mirror that is reported
@@ -31,14 +31,14 @@ from validation.trials.trap_rooms import TRAPS
 
 SEEDS = 3
 REGION = float(chi2.ppf(0.999, 2))
-"""Normalised square of an error beyond which an answer that is called found is wrong. [-]"""
+"""Normalised square of an error above which a position with the status found is wrong. [-]"""
 CONFIDENT = 0.99
 """Confidence of a mirror above which it must not be false. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What one realisation of a trap gave."""
+    """Result of one realisation of a trap."""
 
     mirrors: tuple[SeenMirror, ...]
     missed: tuple[str, ...]  # true walls on which no mirror lies
@@ -47,12 +47,12 @@ class Trial:
     bounces: int | None
     reason: str | None
     error: float | None  # of the position [m]
-    square: float | None  # of that error, over its covariance [-]
+    square: float | None  # normalised square of that error [-]
     duration: float  # [s]
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """What was said with confidence and is not so."""
+        """Confident statements that are false: of the position, of a mirror."""
         said = []
         if self.status == "found" and (self.square is None or not self.square < REGION):
             said.append("position")
@@ -86,7 +86,7 @@ def trial(scenario: str, overrides: Sequence[str], *, seed: int) -> Trial:
 
 
 def table_row(name: str, seed: int, result: Trial) -> str:
-    """Describe one trial in a line."""
+    """Return the line of one trial."""
     right = [
         f"{one.wall} {np.degrees(one.angle):.3f}°/{1e3 * one.offset:+.2f} mm"
         for one in result.mirrors
@@ -113,7 +113,7 @@ def table_row(name: str, seed: int, result: Trial) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Print a table; return 1 if something was said with confidence and is wrong."""
+    """Print a table; return 1 if a confident statement is false."""
     seeds = int(arguments[0]) if arguments else SEEDS
     wrong = 0
     for name in arguments[1:] or TRAPS:

@@ -1,4 +1,4 @@
-"""Whether the stated covariance of a user's position is that of its errors.
+"""Calibration of the stated covariance of a user's position.
 
 Run as ``python -m validation.experiments.uncertainty_calibration [TRIALS [VARIANT …]]``.
 
@@ -47,16 +47,16 @@ VARIANTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """What the trials of one variant gave."""
+    """Results of the trials of one variant."""
 
-    found: int  # answers that are called found
+    found: int  # users with the status found
     trials: int
     errors: Float[np.ndarray, " found"]  # of the position [m]
-    squares: Float[np.ndarray, " found"]  # of the error, over its covariance [-]
-    wall_squares: Float[np.ndarray, " walls"]  # of the wall's angle and offset, over theirs [-]
+    squares: Float[np.ndarray, " found"]  # normalised squares of the errors [-]
+    wall_squares: Float[np.ndarray, " walls"]  # of the wall's angle and offset, normalised [-]
 
     def held(self, probability: float) -> float:
-        """Return the share of the answers found whose region of a probability holds the truth."""
+        """Return the share of users found whose region of a probability holds the truth."""
         return float(np.mean(self.squares < chi2.ppf(probability, 2)))
 
 
@@ -93,7 +93,7 @@ def calibration(
 
 
 def draw(ax: Axes, name: str, result: Calibration) -> Axes:
-    """Draw the share of trials whose error exceeds a square, beside that of χ²."""
+    """Draw the share of trials whose normalised square exceeds a value, with that of χ²."""
     probabilities = (0.95, 0.999)
     most = float(chi2.ppf(0.9999, 2))
     for squares, what, colour in (
@@ -101,7 +101,7 @@ def draw(ax: Axes, name: str, result: Calibration) -> Axes:
         (result.wall_squares, "wall", "#30638e"),
     ):
         if squares.size:
-            # The n-th largest of N is exceeded, at its own value, by n of N.
+            # The n-th largest of N values is reached or exceeded by n of N.
             shares = np.arange(squares.size, 0, -1) / squares.size
             ax.step(np.sort(squares), shares, where="pre", color=colour, label=what)
             most = max(most, 1.05 * float(squares.max()))
@@ -131,7 +131,7 @@ def draw(ax: Axes, name: str, result: Calibration) -> Axes:
 
 
 def table_row(name: str, result: Calibration) -> str:
-    """Describe one variant in a line."""
+    """Return the line of one variant."""
     errors = 1e3 * result.errors
     held = coverage(result.squares, probability=0.95, axes=2)
     mean = consistency(result.squares, axes=2)

@@ -1,6 +1,6 @@
 """Figures: each function draws on an Axes and returns it.
 
-Images, angle/range maps, plans of what was found (2-D and 3-D), and plans of scenarios.
+Images, angle/range maps, plans of estimates (2-D and 3-D), and plans of scenarios.
 """
 
 import lazy_loader

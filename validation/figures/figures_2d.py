@@ -1,4 +1,4 @@
-"""Figures: what was imaged, heard and found. Each function draws on an Axes and returns it."""
+"""Figures of images, maps and estimates in 2-D. Each function draws on an Axes and returns it."""
 
 # Over 400 lines: one plan, with what is drawn on it.
 
@@ -22,9 +22,9 @@ ARRAY = "#30638e"
 MIRROR = "#0b7a75"
 USER = "#d1495b"
 PATH = "#e09f1f"
-ON_DARK = "#8ff0e4"  # for what is overlaid on an image
+ON_DARK = "#8ff0e4"  # for overlays on an image
 
-_MOST_PIXELS = 1200  # along one side of a picture; a finer image is reduced to it
+_MOST_PIXELS = 1200  # along one side of a figure; a finer image is reduced to it
 
 
 def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB) -> Axes:
@@ -35,9 +35,9 @@ def draw_image(ax: Axes, image: Image, *, view: View, floor_db: float = FLOOR_DB
     ax
         Is given equal axes in metres.
     image
-        In a plane, or a volume whose brightest pixel along z is shown.
+        In a plane, or a volume, whose brightest pixel along z is shown.
     view
-        What is shown; the peak is the brightest pixel inside.
+        Region shown; the peak is the brightest pixel inside.
     floor_db
         The darkest level.
     """
@@ -69,7 +69,7 @@ def overlay_mirrors(
     width: float = 1.2,
     line: bool = True,
 ) -> Axes:
-    """Draw the mirrors found: strokes at their ends, numbers and, if asked, a dashed line."""
+    """Draw the mirrors found: strokes at their ends, numbers and optionally a dashed line."""
     for index, mirror in enumerate(mirrors):
         ends = np.stack([mirror.start, mirror.end])
         angle = np.degrees(np.arctan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0]))
@@ -94,7 +94,7 @@ def overlay_mirrors(
 
 
 def overlay_targets(ax: Axes, targets: Sequence[Target], *, colour: str = ON_DARK) -> Axes:
-    """Mark the targets at their unfolded places."""
+    """Mark the targets at their unfolded positions."""
     for index, target in enumerate(targets):
         ax.plot(*target.position[:2], "s", mfc="none", mec=colour, ms=7, mew=1.2)
         if target.ends is not None:
@@ -119,7 +119,7 @@ def overlay_users(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER
 
 
 def overlay_alternatives(ax: Axes, users: Iterable[UserEstimate], *, colour: str = USER) -> Axes:
-    """Mark where else each user may be by a hollow dot, with its probability if that is known."""
+    """Mark each user's alternative positions by hollow dots, with their probability if known."""
     for other in (one for user in users for one in user.alternatives):
         if other.position is None:
             continue
@@ -155,7 +155,7 @@ def mark_user(ax: Axes, name: str, place: Float[np.ndarray, " 3"], *, colour: st
 
 
 def overlay_paths(ax: Axes, users: Iterable[UserEstimate], *, width: float = 1.6) -> Axes:
-    """Draw the path over which each user was heard."""
+    """Draw the propagation path of each user."""
     for user in users:
         if user.path is not None:
             ax.plot(user.path[:, 0], user.path[:, 1], color=PATH, lw=width, zorder=3)
@@ -193,14 +193,14 @@ def draw_angle_range_map(
     Parameters
     ----------
     ax
-        Gets degrees and metres.
+        Its axes are in degrees and metres.
     heard
         The map, or a part of it.
     user
-        Whose angle and path length are marked, if they were found.
+        User whose angle and path length are marked, if found.
     peak
-        What 0 dB is, for a part that is to be compared with the whole; by default the
-        highest magnitude in it. A part is drawn smoothly, and marked on the peak itself.
+        Magnitude of 0 dB, for a part that is compared with the whole; by default the highest
+        magnitude in it. A part is drawn smoothly, and marked at the peak itself.
     floor_db
         The darkest level, below the peak.
     """
@@ -209,7 +209,7 @@ def draw_angle_range_map(
         np.abs(heard.values), np.degrees(heard.aoa), heard.path_length
     )
     level = decibels(magnitude, magnitude.max() if peak is None else peak, floor_db)
-    # A mesh, not a picture: angles are spaced evenly in their cosine.
+    # A mesh, not an image: angles are spaced evenly in their cosine.
     mesh = ax.pcolormesh(
         aoa,
         length,
@@ -256,20 +256,20 @@ def draw_localization(
     true_positions: Sequence[Float[np.ndarray, " 3"]] = (),
     true_walls: Sequence[Float[np.ndarray, "2 3"]] = (),
 ) -> Axes:
-    """Draw the plan of what was found: array, mirrors, the paths, the users.
+    """Draw the plan of an estimate: array, mirrors, paths, users.
 
     Parameters
     ----------
     ax
         Is given equal axes in metres.
     estimate
-        What was found.
+        The estimate.
     positions
-        The aperture. [m]
+        Of the aperture. [m]
     view
-        What is shown.
+        Region shown.
     true_positions, true_walls
-        Where users and walls really are; empty if that is not known. [m]
+        True positions of users and walls; empty if unknown. [m]
     """
     ax.set_facecolor("white")
     ax.grid(color="#dfe4e8", lw=0.6)
@@ -295,11 +295,11 @@ def draw_close_up(
     Parameters
     ----------
     ax
-        Is given equal axes in millimetres, about the truth or else the estimate.
+        Set to equal scales in millimetres, about the truth or else the estimate.
     user
-        Must have a position.
+        With a position.
     truth
-        Where the user really is, if known. [m]
+        True position of the user, if known. [m]
 
     Raises
     ------
@@ -343,16 +343,16 @@ def decibels(
 ) -> Float[np.ndarray, "x y"]:
     """Return a magnitude in decibels over a peak, no lower than a floor."""
     lowest = 10 ** (floor_db / 20) * peak
-    if lowest <= 0:  # nothing at all was imaged
+    if lowest <= 0:  # an empty image
         return np.full_like(magnitude, floor_db)
     level: np.ndarray = 20 * np.log10(np.maximum(magnitude, lowest) / peak)
     return level
 
 
 def level_bar(ax: Axes, mesh: ScalarMappable, label: str) -> None:
-    """Add a colour bar beside a drawing, as high as that."""
+    """Add a colour bar beside a drawing, of the same height."""
     figure = ax.get_figure()
-    if figure is not None:  # inset: as high as the picture, whatever its aspect
+    if figure is not None:  # inset: as high as the drawing, whatever its aspect
         beside = ax.inset_axes((1.02, 0.0, 0.03, 1.0))
         figure.colorbar(mesh, cax=beside, label=label)
 
@@ -388,7 +388,7 @@ def _brightest_of_blocks(
     x: Float[np.ndarray, " x"],
     y: Float[np.ndarray, " y"],
 ) -> tuple[Float[np.ndarray, "u v"], Float[np.ndarray, " u"], Float[np.ndarray, " v"]]:
-    """Reduce an image to what a picture can show; a thin bright line must not fade away."""
+    """Reduce an image by the maxima of blocks, so that thin bright lines stay visible."""
     for axis in (0, 1):
         size = magnitude.shape[axis]
         factor = -(-size // _MOST_PIXELS)

@@ -1,4 +1,4 @@
-"""Figures of a volume: three projections of it, and a pilot over both angles."""
+"""Figures of a volume: its projections, and maps of a pilot over both angles."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ LABELS = ("x, along the array [m]", "y, boresight [m]", "z, up [m]")
 
 @dataclass(frozen=True, kw_only=True)
 class Projection:
-    """A direction to look along: which of the world's axes go right and up."""
+    """A direction of projection, by the world's axes that point right and up."""
 
     name: str
     right: int
@@ -23,7 +23,7 @@ class Projection:
 
     @property
     def along(self) -> int:
-        """The axis that is looked along."""
+        """The axis of projection."""
         return 3 - self.right - self.up
 
 
@@ -35,7 +35,7 @@ VIEWS = (TOP, FRONT, SIDE)
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
-    """The part of space that is shown."""
+    """The region of space that is shown."""
 
     low: Float[np.ndarray, " 3"]  # [m]
     high: Float[np.ndarray, " 3"]  # [m]
@@ -47,7 +47,7 @@ class Box:
 
 
 def box_around(points: Float[np.ndarray, "points 3"], *, margin: float = 0.05) -> Box:
-    """Return the box that holds all points, and a margin of its largest side [-]."""
+    """Return the box that contains all points, with a margin relative to its largest side [-]."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(float((high - low).max()), 1e-3)
     half = np.maximum(high - low, 0.3 * size) / 2 + margin * size
@@ -114,22 +114,22 @@ def draw_plan(
     true_positions: Sequence[Float[np.ndarray, " 3"]] = (),
     users: bool = True,
 ) -> Axes:
-    """Draw walls, targets, paths and users as seen along one axis.
+    """Draw walls, targets, paths and users in projection along one axis.
 
     Parameters
     ----------
     ax
         Is given equal axes in metres.
     estimate
-        What was found.
+        The estimate.
     positions
-        The aperture. [m]
+        Of the aperture. [m]
     view, box
         What is shown.
     colour, array_colour
         Of walls and targets, and of the array.
     true_positions
-        Where users really are, if known. [m]
+        True positions of users, if known. [m]
     users
         Whether paths and users are drawn.
     """

@@ -1,4 +1,4 @@
-"""The scale bar of an image: how large its resolution cell is."""
+"""The scale bars of an image: size of its resolution cell."""
 
 import numpy as np
 from jaxtyping import Float
@@ -18,18 +18,18 @@ def draw_resolution_bars(
     *,
     cells: int = 10,
 ) -> Axes:
-    """Draw bars of so many -3 dB resolution cells in a corner: along range, and across.
+    """Draw bars of a number of -3 dB resolution cells in a corner: along range, and across.
 
     Parameters
     ----------
     ax, view
-        The axes and what they show.
+        The axes and the region shown.
     point
-        Where the cell is meant: across range it grows with distance. [m]
+        Point at which the cell is computed: across range it grows with distance. [m]
     positions, frequencies
         Of the untapered echo. [m], [Hz]
     cells
-        Cells in a bar; one alone is too short to be seen.
+        Cells in a bar; a single one is too short to be visible.
     """
     cell = cell_at(point, positions=positions, frequencies=frequencies)
     x = view.right - 0.05 * (view.right - view.left) - cells * cell.across

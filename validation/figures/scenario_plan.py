@@ -1,4 +1,4 @@
-"""The plan of a scenario: what is simulated, drawn before anything is computed."""
+"""The plan of a scenario, drawn before any simulation."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,21 +19,21 @@ DIELECTRIC = "#8c6d4f"
 TARGET_PATH = "#2c7a51"
 TRANSMITTER = "#8a4fa0"
 FAINT_DB = -30.0
-"""Below this gain, relative to the antennas' peaks, a path is drawn faint: nobody hears it."""
+"""Gain relative to the antennas' peaks below which a path is drawn faint: it is negligible. [dB]"""
 
-_BEAM = 0.25  # length of the wedge that shows where an antenna looks, over the view's size
-_MARGIN = 0.15  # around all that is drawn, over the view's size: room for names beside walls
+_BEAM = 0.25  # length of the wedge that shows an antenna's beam, over the view's size
+_MARGIN = 0.15  # around the drawing, over the view's size: space for names beside walls
 
 
 def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = ()) -> Axes:
-    """Draw a scenario from above: array, objects, users and where their antennas look.
+    """Draw a scenario from above: array, objects, users and the aims of their antennas.
 
     Parameters
     ----------
     ax
-        Is given equal axes in metres.
+        Set to equal scales in metres.
     scenario
-        What is drawn, projected along z.
+        Drawn in projection along z.
     paths
         Its specular paths, to be drawn with it.
     """
@@ -84,9 +84,9 @@ def draw_scenario(ax: Axes, scenario: Scenario, paths: Sequence[ScenarioPath] = 
 def _station_beams(
     ax: Axes, scenario: Scenario
 ) -> list[tuple[Float[np.ndarray, " 3"], Antenna, str]]:
-    """Mark the base station's antennas; return place, kind and colour of those with a beam.
+    """Mark the base station's antennas; return position, kind and colour of those with a beam.
 
-    Of many receivers the middle one shows its beam.
+    Of many receivers the beam of the middle one is drawn.
     """
     station = scenario.base_station
     places = station.element_positions
@@ -119,7 +119,7 @@ def _label(ax: Axes, place: Float[np.ndarray, " 3"], text: str, colour: str) -> 
 
 
 def path_style(path: ScenarioPath) -> dict[str, Any]:
-    """Choose how a path is drawn: by what is at its end, faint where no antenna looks."""
+    """Return the style of a path: by its end, and faint outside of the antennas' beams."""
     faint = path.gain_db < FAINT_DB
     return {
         "color": figures_2d.PATH if path.kind == "user" else TARGET_PATH,
@@ -198,7 +198,7 @@ def _draw_beam(
 def half_power_width(antenna: Antenna) -> float | None:
     """Return the angle between an antenna's half-power directions, None if isotropic [rad].
 
-    The simulator's patterns in closed form: a plan needs neither the simulator nor LLVM.
+    In closed form, so that a plan needs neither the simulator nor LLVM.
     """
     if isinstance(antenna, GaussianBeam):
         return float(2 * antenna.sigma_rad * np.sqrt(np.log(2)))
@@ -210,5 +210,5 @@ def half_power_width(antenna: Antenna) -> float | None:
 
 
 def _readable(angle_deg: float) -> float:
-    """Turn a text's angle so that it never stands on its head [degree]."""
+    """Return a text's angle rotated by 180° if it would be upside down [degree]."""
     return (angle_deg + 90.0) % 180.0 - 90.0

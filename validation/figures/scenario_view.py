@@ -15,15 +15,15 @@ from validation.figures import figures_2d
 from validation.figures.scenario_plan import DIELECTRIC, MATERIAL_COLOURS, TRANSMITTER, path_style
 
 STRIP_HEIGHT = 0.12
-"""Height of the strips that stand for the lines of a 2-D scene, over the scene's size [-]."""
+"""Height of the strips that represent the lines of a 2-D scene, over the scene's size [-]."""
 
 SHELL = 0.4
-"""Size of a surface, over the scene's, from which it may hide the others. [-]"""
+"""Size of a surface, over the scene's, above which it may enclose and hide others. [-]"""
 
 MOST_FACES = 20_000
-"""Faces drawn of one object; of a finer mesh, evenly chosen ones."""
+"""Most faces drawn of one object; of a finer mesh, evenly chosen ones. [-]"""
 
-_ELEVATION, _AZIMUTH = 32.0, -58.0  # where the drawing is seen from, from +x [degree]
+_ELEVATION, _AZIMUTH = 32.0, -58.0  # of the viewpoint, azimuth from +x [degree]
 
 
 def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()) -> Axes3D:
@@ -32,9 +32,9 @@ def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()
     Parameters
     ----------
     ax
-        Is given equal axes in metres.
+        Set to equal scales in metres.
     scenario
-        What is drawn, smooth; the lines of a 2-D scene become low upright strips.
+        Drawn with smooth surfaces; the lines of a 2-D scene become low upright strips.
     paths
         Its specular paths, to be drawn with it.
     """
@@ -57,7 +57,7 @@ def draw_view(ax: Axes3D, scenario: Scenario, paths: Sequence[ScenarioPath] = ()
         material = scenario.objects[surface.name].material
         colour = MATERIAL_COLOURS.get(str(material), DIELECTRIC)
         edges = to_rgba(colour, 0.9 if len(corners) <= 200 else 0.15)
-        # What encloses the others is drawn as outlines, nearly.
+        # Surfaces that enclose others are drawn almost transparent.
         shell = float(np.ptp(surface.vertices, axis=0).max()) > SHELL * size
         face = to_rgba(colour, 0.04 if shell and scenario.dimensions == 3 else 0.28)
         ax.add_collection3d(

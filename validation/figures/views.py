@@ -1,4 +1,4 @@
-"""Which part of the plane a figure shows."""
+"""The region of the plane that a figure shows."""
 
 from dataclasses import dataclass
 
@@ -28,16 +28,16 @@ class View:
 def view_around(
     points: Float[np.ndarray, "points 3"], *, margin: float = 0.08, narrowest: float = 0.45
 ) -> View:
-    """Choose a view that holds all points.
+    """Choose a view that contains all points.
 
     Parameters
     ----------
     points
-        What must be inside; NaN is ignored. [m]
+        Points to be inside; NaN is ignored. [m]
     margin
         Space on each side, over the larger side of the view. [-]
     narrowest
-        Least ratio of the two sides, so that a row of points still makes a picture. [-]
+        Least ratio of the two sides, for points in a row. [-]
     """
     low, high = np.nanmin(points[:, :2], axis=0), np.nanmax(points[:, :2], axis=0)
     size = high - low
@@ -51,7 +51,7 @@ def view_around(
 def estimate_points(
     estimate: Estimate, positions: Float[np.ndarray, "positions 3"]
 ) -> Float[np.ndarray, "points 3"]:
-    """Collect what a plan of an estimate must show: array, mirrors, targets, users, paths."""
+    """Return the points of an estimate for its plan: array, mirrors, targets, users, paths."""
     points = [positions]
     points += [np.stack([mirror.start, mirror.end]) for mirror in estimate.mirrors]
     points += [target.position[None] for target in estimate.targets]
@@ -62,7 +62,7 @@ def estimate_points(
 
 
 def ghost_points(estimate: Estimate) -> Float[np.ndarray, "points 3"]:
-    """Collect where the raw image shows what is seen through mirrors."""
+    """Return the positions of ghosts in the raw image."""
     points = [target.ghost[None] for target in estimate.targets]
     for mirror in estimate.mirrors:
         ends = np.stack([mirror.start, mirror.end])
@@ -76,16 +76,16 @@ def ghost_points(estimate: Estimate) -> Float[np.ndarray, "points 3"]:
 def faintest_db(
     image: Image, things: Float[np.ndarray, "things 3"], *, within: float
 ) -> float | None:
-    """Return the level of the faintest of some things in an image, relative to its peak. [dB].
+    """Return the level of the faintest of some objects in an image, relative to its peak. [dB].
 
     Parameters
     ----------
     image
         In a plane.
     things
-        Where they are; those outside the image do not count. [m]
+        Their positions; those outside the image are ignored. [m]
     within
-        The brightest pixel within this distance along x and y is a thing's level. [m]
+        Distance along x and y within which the brightest pixel gives an object's level. [m]
     """
     magnitude = brightest_plane(image)
     peak = float(magnitude.max())
@@ -101,14 +101,14 @@ def faintest_db(
 
 
 def bright_points(image: Image, *, threshold_db: float = -20.0) -> Float[np.ndarray, "2 3"]:
-    """Return two corners of the box that holds nearly all of what is bright in an image.
+    """Return two corners of the box that contains nearly all bright pixels of an image.
 
     Parameters
     ----------
     image
         In a plane.
     threshold_db
-        What counts as bright, relative to the peak.
+        Least level of bright pixels, relative to the peak. [dB]
     """
     power = np.abs(brightest_plane(image)) ** 2
     power = np.where(power >= power.max() * 10 ** (threshold_db / 10), power, 0.0)

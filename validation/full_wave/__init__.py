@@ -1,8 +1,8 @@
 """Two-dimensional full wave, by boundary integral equations: the reference for the simulator.
 
 Conductors and homogeneous dielectrics, open strips and closed bodies with corners, TM and TE,
-solved hierarchically so that long walls fit; whole scenarios; and comparisons with physical optics
-on the very same profile.
+solved hierarchically for long walls; whole scenarios; and comparisons with physical optics on the
+same profile.
 """
 
 import lazy_loader

@@ -1,11 +1,11 @@
-r"""Full-wave fields on a dense uniform frequency grid, solved for at far fewer frequencies.
+r"""Full-wave fields on a dense uniform frequency grid, interpolated from few solutions.
 
-Seen from one place, a wall's echo has delays within a window of a few decimetres around that of
-its centre. With that delay taken out, a path of the window's end turns by :math:`z = \pi B
-\tau` from the band's centre to either end, and as a function of frequency the field is a
-polynomial of little more than that degree: it is interpolated from Chebyshev nodes. What
-bounces several times comes later and is weaker; a margin is for it, and the result is compared
-with direct solutions between the nodes.
+At one position, a wall's echo has delays within a window of a few decimetres around that of its
+centre. Without that delay, the phase of a path at the window's end changes by :math:`z = \pi B
+\tau` from the band's centre to either end, and the field is approximated by a polynomial in
+frequency of little more than that degree: it is interpolated from Chebyshev nodes. Multiple
+bounces are later and weaker; the degree has a margin for them, and the result is compared with
+direct solutions between the nodes.
 """
 
 import math
@@ -19,18 +19,19 @@ from scipy.constants import speed_of_light
 from validation.full_wave.strip_scattering import StripFields, StripScene, strip_fields
 
 MARGINS, EXTRA = (1.15, 2.0, 4.0), 30
-"""Nodes over the phase z, and nodes more: J_n(z) is below 1e-7 there for z up to 500. Where that
-is not enough, as between the flanks of a very rough wall, the next margin is tried. [-]"""
+"""Number of nodes over the phase z, and additional nodes: J_n(z) is below 1e-7 there for z up to
+500. If the error is too large, as between the flanks of a very rough wall, the next margin is
+tried. [-]"""
 
 COMPARED = (0.1, 0.37, 0.81)
-"""Where in the band the interpolation is compared with a solution. [-]"""
+"""Relative positions in the band at which the interpolation is compared with solutions. [-]"""
 
 MOST_ERROR = 1e-3
-"""Of the interpolation, over the field's norm: 40 dB below a noise of 20 dB SNR. [-]"""
+"""Largest interpolation error over the field's norm: 40 dB below the noise at 20 dB SNR. [-]"""
 
 
 Solved = Callable[[Float[np.ndarray, " wanted"]], Complex[np.ndarray, "ways positions wanted"]]
-"""Fields of some ways at all positions, for frequencies in Hz."""
+"""Returns the fields of some links at all positions, for frequencies in Hz."""
 
 
 def band_fields(
@@ -49,9 +50,9 @@ def band_fields(
     scene
         The strip and its sources.
     frequencies
-        Where the fields are wanted, increasing. [Hz]
+        Of the result, increasing. [Hz]
     most_error
-        Of the interpolation; where it is not reached, all frequencies are solved for. [-]
+        Of the interpolation; if it is exceeded, all frequencies are solved for. [-]
     folder, workers, advance
         See :func:`validation.full_wave.strip_scattering.strip_fields`.
 
@@ -79,18 +80,18 @@ def interpolated_fields(
     *,
     most_error: float = MOST_ERROR,
 ) -> Complex[np.ndarray, "ways positions freqs"]:
-    """Solve at Chebyshev nodes of a band and interpolate; at all frequencies where that fails.
+    """Solve at Chebyshev nodes of a band and interpolate; if that fails, solve at all frequencies.
 
     Parameters
     ----------
     solved
-        Solves.
+        Solver for given frequencies.
     frequencies
-        Where the fields are wanted, increasing. [Hz]
+        Of the result, increasing. [Hz]
     delays, half_window
-        Of each way at each position, and how far from there most of it arrives. [s]
+        Delay of each link at each position, and half width of the window of delays. [s]
     most_error
-        Of the interpolation, over the norm of each way's field. [-]
+        Of the interpolation, over the norm of each link's field. [-]
     """
     for margin in MARGINS:
         needed = nodes_needed(frequencies, half_window, margin)
@@ -105,7 +106,7 @@ def interpolated_fields(
 def nodes_needed(
     frequencies: Float[np.ndarray, " freqs"], half_window: float, margin: float = MARGINS[0]
 ) -> int:
-    """Return how many nodes carry a band; parameters as in :func:`interpolated_fields`."""
+    """Return the number of nodes for a band; parameters as in :func:`interpolated_fields`."""
     return math.ceil(margin * np.pi * float(np.ptp(frequencies)) * half_window) + EXTRA
 
 
@@ -115,7 +116,7 @@ def _interpolated(
     delays: Float[np.ndarray, "ways positions"],
     needed: int,
 ) -> tuple[Complex[np.ndarray, "ways positions freqs"], float]:
-    """Return the interpolated fields, and how far they are off between the nodes. [-]."""
+    """Return the interpolated fields, and their relative error between the nodes. [-]."""
     start, stop = float(frequencies[0]), float(frequencies[-1])
     angles = np.pi * (np.arange(needed) + 0.5) / needed
     nodes = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(angles)
@@ -135,7 +136,7 @@ def _interpolated(
 
 
 def _delays(scene: StripScene) -> tuple[Float[np.ndarray, "ways positions"], float]:
-    """Return the delay over the strip's middle, of each way, and the largest departure [s]."""
+    """Return each link's delay over the strip's middle, and the largest deviation from it [s]."""
     wall = scene.profile[:, :2]
     to_array = np.linalg.norm(scene.positions[:, None, :2] - wall, axis=-1)
     ways = [2 * to_array]
@@ -151,7 +152,7 @@ def _chebyshev_interpolation(
     angles: Float[np.ndarray, " nodes"],
     asked: Float[np.ndarray, " asked"],
 ) -> Float[np.ndarray, "nodes asked"]:
-    """Return the barycentric weights of Chebyshev's roots."""
+    """Return the interpolation matrix from Chebyshev nodes, by the barycentric formula."""
     signed = np.where(np.arange(len(nodes)) % 2 == 0, 1.0, -1.0) * np.sin(angles)
     apart = asked - nodes[:, None]
     hit = apart == 0

@@ -4,8 +4,8 @@ The field :math:`u` is :math:`E_z` (TM) or :math:`H_z` (TE). Outside of all bodi
 
 .. math:: u = u_i + \sum (D\,u - S\,\partial_n u)
 
-with the operators of :mod:`validation.full_wave.layer_potentials`. Unknown are :math:`u` and
-:math:`q = -\partial_n u / k` on the bodies, what of them does not vanish:
+with the operators of :mod:`validation.full_wave.layer_potentials`. Unknowns are :math:`u` and
+:math:`q = -\partial_n u / k` on the bodies, unless they vanish:
 
 ============ ======== ======================================================================
 body         unknown  equation, with :math:`f = D u + k S q` and :math:`g = (N u + k K' q)/k`
@@ -26,9 +26,9 @@ cancel:
 
 .. math:: g_e - (N_i u + \rho k K'_i q)/k + \tfrac12 (1 + \rho) q = -\partial_n u_i / k
 
-Rows and unknowns are weighted by the square root of the arc length, on TE conductors by the arc
-length, over its largest step, where N would grow without bound towards a corner. They are ordered
-along the scene's longest direction, so that a cut between them is a cross-section of the bodies.
+Rows and unknowns are weighted by the square root of the arc length; on TE conductors, where N would
+be unbounded towards a corner, by the arc length over its largest step. They are ordered along the
+scene's longest direction, so that a division between them is a cross-section of the bodies.
 
 References
 ----------
@@ -62,7 +62,7 @@ class Body:
     permittivity: complex | None = None  # ε' - jε''; None: a perfect conductor [-]
 
     def __post_init__(self) -> None:
-        """Refuse a dielectric without an inside, or with gain."""
+        """Refuse an open dielectric, or one with gain."""
         if self.permittivity is None:
             return
         if not self.contour.closed:
@@ -75,12 +75,12 @@ class Body:
 
 
 class BoundaryProblem:
-    """The matrix of a scene, entry by entry, and what sources and receivers mean to it.
+    """The matrix of a scene, evaluated by blocks, and its source and receiver vectors.
 
     Parameters
     ----------
     bodies
-        Apart from each other by several steps of their grids.
+        Separated by several steps of their grids.
     polarisation
         TM or TE.
     wavenumber
@@ -98,7 +98,7 @@ class BoundaryProblem:
         places = np.concatenate([part.body.contour.points[part.points] for part in self._parts])
         spread = places - places.mean(axis=0)
         axis = np.linalg.eigh(spread.T @ spread)[1][:, -1]
-        # Ties keep the components of a point together.
+        # A stable sort keeps the components of a point together.
         order = np.argsort(spread @ axis, kind="stable")
         self._owner, self._point, self._component = owner[order], point[order], component[order]
 
@@ -109,7 +109,7 @@ class BoundaryProblem:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the matrix is: that of open strips alone."""
+        """Whether the matrix is symmetric: it is for open strips alone."""
         return all(not part.body.contour.closed for part in self._parts)
 
     def entries(
@@ -134,7 +134,7 @@ class BoundaryProblem:
     def heard(
         self, receivers: Sequence[LineSource], rows: Int[np.ndarray, " rows"] | None = None
     ) -> Complex[np.ndarray, "rows receivers"]:
-        """Evaluate what each receiver hears of the unknowns; a beam hears as it sends."""
+        """Return each receiver's response to the unknowns; a beam receives as it transmits."""
         return self._ends(receivers, rows, _Part.received)
 
     def _ends(
@@ -198,7 +198,7 @@ class _Part:
         count = body.contour.count
         self.scale = np.ones(count)
         if magnetic and body.permittivity is None:
-            # N grows as the inverse of the step towards a corner or an edge.
+            # Towards a corner or an edge, N grows as the inverse of the step.
             self.scale = np.sqrt(body.contour.weights / body.contour.spacing)
         self.size = count * len(self.tests)
         self.points = np.repeat(np.arange(count), len(self.tests))
@@ -246,7 +246,7 @@ class _Part:
         assert self.inside is not None
         k, ratio = self.wavenumber, self.slope_ratio
         inside = Block(self.curve, self.curve, here, there, self.inside)
-        # The static parts are subtracted before they are evaluated.
+        # The static parts of two media cancel, and are not evaluated.
         whole[0, 0] = outside.double(1 - 1 / ratio) - inside.double(0.0) / ratio
         whole[0, 1] = k * (outside.single() - inside.single())
         hyper = outside.hypersingular(static=False) - inside.hypersingular(static=False)
@@ -264,7 +264,7 @@ class _Part:
     def received(
         self, receiver: LineSource, points: Int[np.ndarray, " points"]
     ) -> Complex[np.ndarray, "densities points"]:
-        """Evaluate what a receiver hears of the densities, weighted."""
+        """Return a receiver's response to the densities, weighted."""
         field, slope = self._lit(receiver, points)
         k = self.wavenumber
         heard = np.stack([k * (slope if one == "u" else field) for one in self.densities])

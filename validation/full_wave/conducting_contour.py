@@ -10,9 +10,9 @@ square root towards an edge. With
           \qquad 0 < \theta < \pi
 
 over the arc length [1]_, the current per step of :math:`\theta` is a smooth, even, periodic
-function. :math:`\alpha = 1/\cosh\delta` close to 1 spaces the points evenly all over the strip
-but for some at its ends; :math:`\delta` is the half width of the strip in which the map is
-analytic, and :math:`N\delta` the digits of the rule over N points.
+function. With :math:`\alpha = 1/\cosh\delta` close to 1 the points are evenly spaced except near
+the ends; :math:`\delta` is the half width of the complex strip in which the map is analytic, and
+the error of the rule over N points is :math:`e^{-N\delta}`.
 
 References
 ----------
@@ -28,21 +28,21 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 EDGE_DIGITS = 16.0
-r""":math:`N\delta`: the rule's error at the edges is about e to minus this, 1e-7. [-]"""
+r""":math:`N\delta`; the rule's error at the edges is its negative exponential, 1e-7. [-]"""
 
 FINER = 4
-"""Points at which the arc length is integrated, for each point of a profile. [-]"""
+"""Integration points of the arc length for each point of a profile. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contour:
     """A conductor's curve, sampled at equal steps of its parameter.
 
-    The points of an open strip lie half a step from its ends, where the parameter turns back.
+    The points of an open strip begin half a step from its ends, where the parameter reverses.
     """
 
     points: Float[np.ndarray, "points 2"]  # [m]
-    normals: Float[np.ndarray, "points 2"]  # to the right of the way: outward if counter-clockwise
+    normals: Float[np.ndarray, "points 2"]  # to the right: outward if counter-clockwise
     speeds: Float[np.ndarray, " points"]  # |dr/dθ| [m]
     curvatures: Float[np.ndarray, " points"]  # positive if convex seen along the normal [1/m]
     step: float  # h, of the parameter [rad]
@@ -68,8 +68,8 @@ class Contour:
 def open_strip(profile: Float[np.ndarray, "vertices axis"], *, spacing: float) -> Contour:
     """Sample an open strip through the points of a profile.
 
-    The curve is the cubic spline through the points, over the profile's chords; points that
-    resolve the roughness leave it no freedom.
+    The curve is the cubic spline through the points, over the profile's chords; the points have to
+    resolve the roughness.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ def open_strip(profile: Float[np.ndarray, "vertices axis"], *, spacing: float) -
     """
     _check_spacing(spacing)
     arc = SplineArc(profile)
-    # The middle is sampled by L/(N − 2·EDGE_DIGITS/π): the rest is spent on the edges.
+    # The spacing in the middle is L/(N − 2·EDGE_DIGITS/π): other points are near the edges.
     count = int(np.ceil(arc.length / spacing + 2 * EDGE_DIGITS / np.pi))
     alpha = 1 / np.cosh(EDGE_DIGITS / count)
     step = np.pi / count
-    # From the first vertex to the last: cos θ falls, so θ runs from π to 0.
+    # From the first vertex to the last: cos θ has to rise, so θ runs from π to 0.
     angle = np.pi - step * (np.arange(count) + 0.5)
     place = np.arcsin(alpha * np.cos(angle)) / np.arcsin(alpha)
     rate = alpha * np.sin(angle) / np.sqrt(1 - (alpha * np.cos(angle)) ** 2) / np.arcsin(alpha)
@@ -178,14 +178,14 @@ def closed_contour(
     Parameters
     ----------
     curve
-        From the parameter, 0 to 2π counter-clockwise, to place, first and second derivative.
+        Function from the parameter, 0 to 2π counter-clockwise, to position and two derivatives.
     count
         Points.
 
     Raises
     ------
     ValueError
-        If the curve runs clockwise: its normals would look inward.
+        If the curve runs clockwise: its normals would point inward.
     """
     angle = 2 * np.pi * np.arange(count) / count
     points, tangent, bend = curve(angle)

@@ -1,12 +1,13 @@
 r"""Scattered fields of a two-dimensional scene at one frequency, by a direct solver.
 
-Sources and receivers far from the bodies light them in far fewer ways than there are places: some
-places are chosen and solved for, all others are interpolated from them. With the right-hand sides
-:math:`B_J` and what is heard :math:`H_J` of the chosen places, and the interpolation :math:`T`,
+The incident fields of sources and receivers far from the bodies have a much lower rank than their
+number: some positions are chosen and solved for, all others are interpolated from them. With the
+right-hand sides :math:`B_J` and the receivers' responses :math:`H_J` of the chosen positions, and
+the interpolation :math:`T`,
 
 .. math:: u_{sr} = t_s^T (B_J^T A^{-T} H_J)\, t_r
 
-Each solution is put back into a few rows of the equations.
+Each solution is checked by its residual in some rows of the equations.
 """
 
 from collections.abc import Sequence
@@ -20,21 +21,20 @@ from validation.full_wave.hodlr_solver import chosen_columns, compress, solve
 from validation.full_wave.line_source import LineSource
 
 TOLERANCE = 1e-7
-"""Where ranks are cut; fields then err by some 1e-6. [-]"""
+"""Relative tolerance of ranks; the error of fields is some 1e-6. [-]"""
 
 LEAF = 160
-"""Most unknowns of a block that is kept whole. [-]"""
+"""Most unknowns of a block that is stored in full. [-]"""
 
 SAMPLINGS = ((160, 96), (480, 288))
-"""Unknowns next to a cut that are sampled, and for each doubling of the distance from it; where
-the first leaves a residual, the next is tried. [-]"""
+"""Unknowns next to a division that are sampled, and for each doubling of the distance from it; if
+the residual with the first is too large, the next is tried. [-]"""
 
 CHECKED, MOST_RESIDUAL = 200, 1e-4
-"""Rows that a solution is put into, and how far it may be off there, over the incident
-field. [-]"""
+"""Rows in which a solution is checked, and the largest residual over the incident field. [-]"""
 
 THINNED = 64
-"""Rows by which the places are chosen, besides twice as many as there are places. [-]"""
+"""Rows by which positions are chosen, in addition to twice the number of positions. [-]"""
 
 
 class FullWaveError(RuntimeError):
@@ -43,7 +43,7 @@ class FullWaveError(RuntimeError):
 
 @dataclass(frozen=True, kw_only=True)
 class Lit:
-    """Places in the scene, chosen ones and how the others follow from these."""
+    """Positions in the scene: the chosen ones, and the interpolation of the others."""
 
     chosen: Int[np.ndarray, " rank"]
     spread: Complex[np.ndarray, "rank places"]
@@ -74,7 +74,7 @@ def link_fields(
 def array_fields(
     problem: BoundaryProblem, array: Sequence[LineSource], users: Sequence[LineSource]
 ) -> Complex[np.ndarray, "ways places"]:
-    """Solve for an array's echo, place by place, and for what each user sends to it.
+    """Solve for an array's monostatic echo, and for each user's pilot at the array.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def array_fields(
 def echo_fields(
     problem: BoundaryProblem, places: Sequence[LineSource]
 ) -> Complex[np.ndarray, " places"]:
-    """Solve for the scattered field of each source at its own place; see :func:`link_fields`."""
+    """Solve for each source's scattered field at its own position; see :func:`link_fields`."""
     return np.asarray(array_fields(problem, places, [])[0])
 
 

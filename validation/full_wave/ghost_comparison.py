@@ -1,11 +1,11 @@
 r"""Ghosts behind a rough mirror against a two-dimensional full-wave solution.
 
 ``python -m validation.full_wave.ghost_comparison TWO.npz WALL.npz`` takes the echo of conducting
-cylinders that are seen only through a rough wall (arrays ``echo``, ``cylinder_centre``,
+cylinders that are visible only over a rough wall (arrays ``echo``, ``cylinder_centre``,
 ``cylinder_radius``, ``aperture_position``, ``frequency``), and that of the same wall alone (the
 layout of :mod:`validation.full_wave.wall_comparison`). The cylinders' part is the difference of the
-two echoes. It holds the ghosts, seen over the wall out and back, and no direct view: the
-array's own link to the cylinders is left out of the reference.
+two echoes. It contains the ghosts, over the wall out and back, and no direct echo: the array's
+direct link to the cylinders is left out of the reference.
 """
 
 import sys
@@ -26,7 +26,8 @@ from validation.full_wave.wall_comparison import read_reference
 
 LEAST_CORRELATION = 0.97
 MOST_LEVEL_DB = 1.5
-"""Physical optics on the wall, then on the cylinders, reaches 0.986 and -0.65 dB. [-], [dB]"""
+"""Limits of agreement. Physical optics on the wall, then on the cylinders, reaches 0.986 and -0.65
+dB. [-], [dB]"""
 
 FACETS_ROUND = 100
 """Facets round a cylinder: λ/4 at 295 GHz on a radius of 4 mm. [-]"""
@@ -35,7 +36,7 @@ FACETS_ROUND = 100
 def cylinders_echo(
     two: dict[str, np.ndarray], wall: dict[str, np.ndarray]
 ) -> Complex[np.ndarray, "positions freqs"]:
-    """Simulate the part of the echo that the hidden cylinders cause, in cylindrical waves.
+    """Simulate the hidden cylinders' part of the echo, in cylindrical waves.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def compare_ghosts(two_path: Path, wall_path: Path) -> tuple[float, float]:
     Raises
     ------
     MeasurementError
-        If a file is not of its layout, or the two are not of the same radio.
+        If a file does not have its layout, or the two are of different radios.
     """
     wall = read_reference(wall_path)
     two = _read_cylinders(two_path, wall)
@@ -83,7 +84,7 @@ def compare_ghosts(two_path: Path, wall_path: Path) -> tuple[float, float]:
 
 
 def circle(centre: Float[np.ndarray, " 3"], radius: float, count: int, *, name: str) -> Surface:
-    """Make a closed conducting surface of a circle in 2-D, by chords of its arc length."""
+    """Return the closed conducting surface of a circle in 2-D, by chords of equal arc length."""
     angles = 2 * np.pi * np.arange(count) / count
     around = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=-1)
     vertices = centre + radius * around
@@ -102,7 +103,7 @@ def _read_cylinders(path: Path, wall: dict[str, np.ndarray]) -> dict[str, np.nda
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    except Exception as error:  # NumPy, zip and zlib fail in many ways on a foreign file
+    except Exception as error:  # NumPy, zip and zlib raise many exceptions on a foreign file
         raise MeasurementError(f"{path}: not an .npz of plain arrays ({error})") from error
     needed = ("echo", "cylinder_centre", "cylinder_radius", "aperture_position", "frequency")
     missing = [name for name in needed if name not in arrays]
@@ -129,7 +130,7 @@ def _read_cylinders(path: Path, wall: dict[str, np.ndarray]) -> dict[str, np.nda
 
 
 def main() -> int:
-    """Compare the files named on the command line; 1 if the agreement falls short."""
+    """Compare the files named on the command line; return 1 if agreement is insufficient."""
     if len(sys.argv) != 3:
         print(__doc__, file=sys.stderr)
         return 2

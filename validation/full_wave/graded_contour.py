@@ -5,10 +5,10 @@ parameter with
 
 .. math:: \frac{ds}{d\tau} = \Delta\, I_{\tau/M}(p, p)
 
-at either end, :math:`I` the regularised incomplete beta function, which rises from 0 to 1 over M
-points as :math:`\tau^p`, and evenly spaced points between. What grows as a power of the distance
-from a corner is, per step, a smooth function of :math:`\tau` across it [1]_, up to an order that
-grows with p.
+at either end, with the regularised incomplete beta function :math:`I`, which rises from 0 to 1 over
+M points as :math:`\tau^p`, and evenly spaced points between. A singularity that is a power of the
+distance from a corner becomes, per step, a smooth function of :math:`\tau` [1]_, up to an order
+that grows with p.
 
 References
 ----------
@@ -25,15 +25,15 @@ from scipy.special import betainc
 from validation.full_wave.conducting_contour import Contour, SplineArc
 
 ORDER, RISE = 5, 40
-"""p, and M: the points over which the spacing rises from a right or blunter corner; of a sharper
-one, whose sides run close to each other, more, as the inverse of its angle. Fields of a conducting
-wedge of 90° then err by some 1e-5. [-]"""
+"""p, and M: the points over which the spacing rises from a corner of 90° or more; for sharper ones,
+whose sides are close to each other, inversely proportional to the angle. The error of fields of a
+conducting wedge of 90° is then some 1e-5. [-]"""
 
 LEAST_ANGLE = float(np.deg2rad(10.0))
-"""Sharpest corner that is sampled. [rad]"""
+"""Least angle of a corner. [rad]"""
 
 CLOSE = 1e-9
-"""How far the end of a side may be from the start of the next, over its length. [-]"""
+"""Largest distance between the end of a side and the start of the next, over its length. [-]"""
 
 
 def cornered_contour(
@@ -44,8 +44,8 @@ def cornered_contour(
     Parameters
     ----------
     sides
-        Points of each, counter-clockwise, from corner to corner; two for a straight one, at least
-        four for a curve (a cubic spline). [m]
+        Points of each side, counter-clockwise, from corner to corner; two for a straight side, at
+        least four for a curve (a cubic spline). [m]
     spacings
         Arc length between the points of each side, at most. [m]
 
@@ -87,7 +87,7 @@ def cornered_contour(
 def box(
     centre: Float[np.ndarray, " 2"], size: tuple[float, float], angle: float, *, spacing: float
 ) -> Contour:
-    """Sample a rectangle, turned by an angle in rad; lengths in m."""
+    """Sample a rectangle, rotated by an angle in rad; lengths in m."""
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     corners = centre + 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size @ axes
     sides = [np.stack([corners[one], corners[(one + 1) % 4]]) for one in range(4)]
@@ -118,7 +118,7 @@ def _side(
     if len(side) == 2:
         side = side[0] + np.linspace(0, 1, 4)[:, None] * (side[1] - side[0])
     arc = SplineArc(side)
-    # The rise at either end takes half its points' arc.
+    # Points in the rise at either end cover half the arc of evenly spaced ones.
     rising = 0.5 * (first + last)
     count = max(int(np.ceil(arc.length / spacing + rising)), first + last)
     step = arc.length / (count - rising)

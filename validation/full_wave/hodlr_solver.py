@@ -1,18 +1,18 @@
 r"""Direct solver for matrices whose off-diagonal blocks have low rank (HODLR).
 
-Points in the order of a curve are halved again and again. Halves A and B of the same parent
-interact by :math:`U V^T` and :math:`W Z^T` of low rank, since waves between distant parts of a
-curve have few degrees of freedom; in a symmetric matrix :math:`W = V`, :math:`Z = U`. Solving is
-exact then, by the Woodbury formula from the leaves up [1]_:
+Points in the order of a curve are bisected recursively. Halves A and B of the same parent interact
+by :math:`U V^T` and :math:`W Z^T` of low rank, since waves between distant parts of a curve have
+few degrees of freedom; in a symmetric matrix :math:`W = V`, :math:`Z = U`. The compressed system is
+solved exactly, by the Woodbury formula from the leaves up [1]_:
 
 .. math:: \begin{pmatrix} A & U V^T \\ W Z^T & B \end{pmatrix}
           \begin{pmatrix} x \\ y \end{pmatrix} = \begin{pmatrix} f \\ g \end{pmatrix}
 
     (1 - Z^T A^{-1} U\, V^T B^{-1} W)\, Z^T x = Z^T A^{-1} f - Z^T A^{-1} U\, V^T B^{-1} g
 
-Blocks are never formed. Their rank is read off a sample of their rows and columns, dense next
-to the point where the halves meet and ever sparser away from it, and a block is interpolated
-from the chosen rows and columns, :math:`M \approx M_{:J} M_{IJ}^{-1} M_{I:}` [2]_.
+Blocks are never formed. Their rank is determined from a sample of their rows and columns, dense
+next to the point where the halves meet and sparser away from it, and a block is interpolated from
+the chosen rows and columns, :math:`M \approx M_{:J} M_{IJ}^{-1} M_{I:}` [2]_.
 
 References
 ----------
@@ -36,19 +36,19 @@ Entries = Callable[
 """Block of the matrix at the given rows and columns."""
 
 LEAF = 80
-"""Most points of a block that is kept whole. [-]"""
+"""Most points of a block that is stored in full. [-]"""
 
 NEAR = 40
-"""Points next to the meeting point that are all in the sample. [-]"""
+"""Points next to the meeting point, all of which are sampled. [-]"""
 
 PER_OCTAVE = 12
-"""Samples for each doubling of the distance from there. [-]"""
+"""Samples for each doubling of the distance from the meeting point. [-]"""
 
 MOST_FILLED = 0.6
-"""Rank over the sample's size up to which the sample is taken to show all of it. [-]"""
+"""Largest ratio of rank to sample size at which the sample counts as sufficient. [-]"""
 
 TOLERANCE = 1e-8
-"""Where the sample's pivoted QR decomposition is cut, over its first pivot. [-]"""
+"""Least pivot of the sample's pivoted QR decomposition that is kept, over the first one. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +101,9 @@ def compress(
     first, last
         The part; the last index is left out.
     leaf
-        Most points of a block that is kept whole.
+        Most points of a block that is stored in full.
     tolerance
-        Where ranks are cut. [-]
+        Relative tolerance of ranks. [-]
     symmetric
         Whether the lower left blocks are the upper right ones' transposes.
     sampling
@@ -148,7 +148,7 @@ def solve(
         return np.asarray(lu_solve(factors, sides, check_finite=False))
     link = matrix.link
     split, count = len(link.left), sides.shape[1]
-    # The links of this level are more right-hand sides of the halves: all goes up in one sweep.
+    # The links of this level are further right-hand sides of the halves: one upward sweep.
     upper = solve(matrix.halves[0], np.concatenate([sides[:split], link.left], axis=1))
     lower = solve(matrix.halves[1], np.concatenate([sides[split:], link.lower_left], axis=1))
     above, below = link.lower_right.T @ upper, link.right.T @ lower
@@ -172,9 +172,9 @@ def chosen_columns(
     Parameters
     ----------
     sample
-        Rows that stand for all.
+        Rows that represent all.
     tolerance
-        Where the pivoted QR decomposition is cut, over its first pivot. [-]
+        Least pivot of the pivoted QR decomposition that is kept, over the first one. [-]
     """
     triangle, order = qr(sample, mode="r", pivoting=True, check_finite=False)
     pivots = np.abs(np.diagonal(triangle))
@@ -202,7 +202,7 @@ def _link(
         sample = entries(above, below)
         columns, _ = chosen_columns(sample, tolerance)
         whole = len(above) == middle - first and len(below) == last - middle
-        # A sample that is all but full rank says nothing of the block: take a denser one.
+        # A sample of almost full rank does not show the block's rank: take a denser one.
         if whole or len(columns) < MOST_FILLED * min(sample.shape):
             break
         near, per_octave = 2 * near, 2 * per_octave
@@ -214,7 +214,7 @@ def _link(
 
 
 def _sampled(count: int, near: int, per_octave: int) -> Int[np.ndarray, " sampled"]:
-    """Choose distances 0 … count − 1 from the meeting point."""
+    """Return sampled distances from the meeting point, within 0 … count − 1."""
     if count <= 2 * near:
         return np.arange(count)
     octaves = np.log2(count / near)

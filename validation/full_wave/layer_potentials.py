@@ -7,8 +7,8 @@ For a wavenumber :math:`k`, real or of a lossy medium, with :math:`G = -\tfrac j
 .. math:: S = G, \quad D = \partial_{n'} G, \quad K' = \partial_n G, \quad
           N = \partial_n \partial_{n'} G
 
-are written with :math:`E = G'(z)/z + 1/2\pi z^2`, :math:`z = kR`, which has no pole. So the part
-of the static field stands alone, and cancels exactly where two media are subtracted:
+are written with :math:`E = G'(z)/z + 1/2\pi z^2`, :math:`z = kR`, which has no pole. So the static
+part is separate, and cancels exactly in differences of two media:
 
 .. math:: D = \frac{\hat n' \cdot \mathbf R}{2\pi R^2} - k^2 E\, \hat n' \cdot \mathbf R, \qquad
           K' = -\frac{\hat n \cdot \mathbf R}{2\pi R^2} + k^2 E\, \hat n \cdot \mathbf R
@@ -30,9 +30,9 @@ should get :math:`-\pi|\omega|`, so
 
 with the arc length :math:`w = h\,ds/d\theta` of a point's step, the Schwarzian derivative
 :math:`S` of the arc length over the parameter, the curvature :math:`\kappa`, and the second
-difference :math:`d`, of reach 14, that takes a wave to :math:`-\omega^2`. On a closed curve the
-diagonal follows instead from a constant density, whose static field is constant inside and 0
-outside; this holds at corners, too.
+difference :math:`d`, of 14 neighbours, whose response to a wave is :math:`-\omega^2`. On a closed
+curve the diagonal is determined instead by a constant density, whose static field is constant
+inside and 0 outside; this is valid at corners, too.
 
 Matrices are weighted, :math:`w_i^{1/2} A_{ij} w_j^{1/2}`.
 """
@@ -48,14 +48,14 @@ from validation.full_wave.line_source import FAR
 from validation.full_wave.log_quadrature import log_weights
 
 SMALL = 0.3
-"""Argument below which E is taken from its series: no pole is subtracted there. [-]"""
+"""Argument below which E is evaluated by its series, without subtraction of the pole. [-]"""
 
 DIFFERENCE_BAND, DIFFERENCE_REACH = 2.0, 14
-"""Phase from point to point up to which the second difference is right to 2e-9, and its reach:
-a density at three points per wavelength. [rad], [-]"""
+"""Phase from point to point up to which the error of the second difference is 2e-9 (a density at
+three points per wavelength), and its number of neighbours. [rad], [-]"""
 
 ROWS_AT_ONCE = 512
-"""Rows of a closed curve's static field that are summed at once. [-]"""
+"""Rows of a closed curve's static field that are summed in one batch. [-]"""
 
 Matrix = Complex[np.ndarray, "rows columns"] | Float[np.ndarray, "rows columns"]
 
@@ -68,7 +68,7 @@ def green_and_slope(
     Parameters
     ----------
     phase
-        :math:`z = kR`, not 0, of an imaginary part that is not positive. [rad]
+        :math:`z = kR`, not 0, with an imaginary part of 0 or less. [rad]
     """
     size = np.abs(phase)
     clipped = np.where(size < FAR, FAR, phase)
@@ -81,7 +81,7 @@ def green_and_slope(
     odd_1 = inverse * (3 + square * (-52.5 + square * (1091475 / 120)))
     wave = 0.25 * np.sqrt(2 / np.pi / clipped) * np.exp(-1j * (clipped - 0.25 * np.pi))
     green = -1j * wave * (even + 1j * odd)
-    # H₁ is turned by a quarter more.
+    # H₁ has a further phase of 90°.
     slope = 1j * wave * 1j * (even_1 - 1j * odd_1) / clipped
     slope += 1 / (2 * np.pi * clipped * clipped)
     near = size < FAR
@@ -133,7 +133,7 @@ def _difference_weights() -> tuple[float, ...]:
 
 
 def second_difference() -> Float[np.ndarray, " weights"]:
-    """Return the weights of a point and of its neighbours that differentiate twice. [-]."""
+    """Return the weights of a point and of its neighbours in the second difference. [-]."""
     return np.array(_difference_weights())
 
 
@@ -163,7 +163,7 @@ class CurveOperators:
             return np.asarray(pole / weights + weights * contour.curvatures**2 / (24 * np.pi))
         found = np.empty(contour.count)
         every = np.arange(contour.count)
-        # A constant density gives nothing; its second difference vanishes by itself.
+        # N of a constant density is 0, and so is its second difference.
         for first in range(0, contour.count, ROWS_AT_ONCE):
             rows = every[first : first + ROWS_AT_ONCE]
             static = static_hypersingular(self, self, rows, every)
@@ -178,8 +178,8 @@ class CurveOperators:
 
         Returns
         -------
-        Rows, columns, how many steps apart, and the sign of a density that turns with the
-        parameter at an edge.
+        Rows, columns, their distance in steps, and the sign of an odd density when the parameter
+        reverses at an edge.
         """
         count = self.contour.count
         steps = rows[:, None] - columns
@@ -202,7 +202,7 @@ class Block:
     Parameters
     ----------
     to, source
-        The receiving and the sending curve.
+        The receiving and the source curve.
     rows, columns
         Points of either.
     wavenumber

@@ -1,17 +1,17 @@
-r"""Fields of line sources in two dimensions, of real and of complex place.
+r"""Fields of line sources in two dimensions, at real and at complex positions.
 
 Time convention :math:`e^{+j\omega t}`; a unit line source has the field of the free-space
 Green's function
 
 .. math:: G(R) = -\tfrac{j}{4} H_0^{(2)}(kR)
 
-A line source moved by the imaginary distance :math:`b` against its aim is an exact solution of
-the wave equation outside a short cut at its place, and close to the aim a Gaussian beam,
+A line source displaced by the imaginary distance :math:`b` against its aim is an exact solution of
+the wave equation outside a short branch cut at its position, and near the aim a Gaussian beam,
 
 .. math:: g(\psi) \approx e^{-kb(1 - \cos\psi)} \approx e^{-\psi^2/2\sigma^2}, \qquad
           \sigma = 1/\sqrt{kb}
 
-here normalised so that along the aim, far away, it has the level of the real source [1]_.
+here normalised to the level of the real source along the aim, in the far field [1]_.
 
 References
 ----------
@@ -26,8 +26,8 @@ from jaxtyping import Complex, Float
 from scipy.special import hankel2, hankel2e, j0, y0
 
 FAR = 25.0
-"""Argument from which the asymptotic series is used: what it leaves out is below 2e-10
-of the field there. It takes half the time of the tabulated functions. [-]"""
+"""Argument above which the asymptotic series is used: its relative error is below 2e-10, and it
+takes half the time of the Bessel functions. [-]"""
 
 
 def greens_function(phase: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
@@ -73,8 +73,8 @@ def radial_derivative(phase: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n
 class LineSource:
     """A unit line source, isotropic or a beam.
 
-    A beam has either an angular width that is the same at all frequencies, or the imaginary
-    displacement of a source that has one place at all frequencies.
+    A beam has either the same angular width, or the same imaginary displacement, at all
+    frequencies.
     """
 
     position: Float[np.ndarray, " 2"]  # [m]
@@ -83,7 +83,7 @@ class LineSource:
     displacement: float | None = None  # b [m]
 
     def __post_init__(self) -> None:
-        """Refuse a beam that is told twice, or not at all."""
+        """Refuse a beam with both width and displacement, or with neither."""
         told = [one for one in (self.width, self.displacement) if one is not None]
         if len(told) != (self.aim is not None) or not all(one > 0 for one in told):
             raise ValueError(
@@ -112,7 +112,7 @@ class LineSource:
     def _complex_way(
         self, points: Float[np.ndarray, "points 2"], wavenumber: float
     ) -> tuple[Complex[np.ndarray, "points 2"], Complex[np.ndarray, " points"], float]:
-        """Return the way from the source's complex place, its length in phase, and kb."""
+        """Return the vectors from the source's complex position, their lengths times k, and kb."""
         way = (points - self.position).astype(np.complex128)
         decay = 0.0
         if self.aim is not None:
@@ -123,6 +123,6 @@ class LineSource:
             )
             way += 1j * decay / wavenumber * self.aim / np.hypot(*self.aim)
         distance = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2)
-        # The far root: the wave runs away from the source, strongest along the aim.
+        # This root gives an outgoing wave, strongest along the aim.
         distance = np.where(distance.real < 0, -distance, distance)
         return way, wavenumber * distance, decay

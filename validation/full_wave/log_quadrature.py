@@ -5,18 +5,17 @@ On a uniform grid of step :math:`h`, for a smooth function :math:`F`,
 .. math:: \int F(x) \ln|x|\,dx = h \sum_{j \ne 0} F(jh) \ln|jh| + h F(0) \ln h
           + h \sum_{|j| \le m} c_{|j|} F(jh)
 
-For a wave :math:`F = e^{j \omega x / h}` the sum over *all* points misses, by Poisson's
-formula,
+For a wave :math:`F = e^{j \omega x / h}` the error of the punctured sum over *all* points is, by
+Poisson's formula,
 
 .. math:: T(\omega) = -\ln 2\pi - \gamma
           - \tfrac12 \bigl[\psi(1 - \tfrac{\omega}{2\pi}) + \psi(1 + \tfrac{\omega}{2\pi})\bigr]
 
 with the digamma function :math:`\psi`; its series at 0 is that of the zeta-corrected rule
-[1]_, which takes the :math:`c_j` from derivatives at :math:`\omega = 0`. Chosen instead: the
-cosine polynomial :math:`\sum c_{|j|} \cos j\omega` that fits :math:`T` best over the band that
-the functions fill, so that a grid of some six points per wavelength is spectrally accurate.
-The correction stays local, unlike that of Kress [2]_, so distant points interact by the plain
-kernel and can be compressed.
+[1]_, whose :math:`c_j` are determined by derivatives at :math:`\omega = 0`. Here the cosine
+polynomial :math:`\sum c_{|j|} \cos j\omega` is fitted to :math:`T` over the band of the functions,
+so that a grid of some six points per wavelength is spectrally accurate. Unlike that of Kress [2]_,
+the correction is local, so distant points interact by the plain kernel and can be compressed.
 
 References
 ----------
@@ -33,17 +32,17 @@ from jaxtyping import Float
 from scipy.special import digamma
 
 BAND = 2.4
-"""Largest phase from one point to the next of what is integrated, kernel and density
-together: twice that of a wave at 5.2 points per wavelength. [rad]"""
+"""Largest phase from one point to the next of the integrand, kernel times density: twice that of a
+wave at 5.2 points per wavelength. [rad]"""
 
 REACH = 14
-"""Neighbours on each side that are corrected: the fit then errs by 8e-8. [-]"""
+"""Neighbours on each side that are corrected: the error of the fit is 8e-8. [-]"""
 
 _SAMPLES = 400
 
 
 def missing_logarithm(phase: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    r"""Return :math:`T(\omega)`, what the punctured trapezoidal rule misses. [-].
+    r"""Return :math:`T(\omega)`, the error of the punctured trapezoidal rule. [-].
 
     Parameters
     ----------
@@ -75,7 +74,7 @@ def log_weights(*, reach: int = REACH, band: float = BAND) -> Float[np.ndarray, 
     reach
         :math:`m`, neighbours on each side.
     band
-        Largest phase from one point to the next that is integrated well. [rad]
+        Largest phase from one point to the next for which the weights are fitted. [rad]
 
     Raises
     ------

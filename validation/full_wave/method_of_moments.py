@@ -17,7 +17,7 @@ with :math:`S` the integral above on the conductor and :math:`K'` its normal der
 Nyström's method on the grids of :mod:`validation.full_wave.conducting_contour`: the trapezoidal
 rule, corrected near the diagonal (:mod:`validation.full_wave.log_quadrature`) by the coefficients
 of the logarithm, :math:`-J_0(kR)/2\pi` in :math:`S` and :math:`kJ_1(kR)\,\hat n\cdot\hat R/2\pi` in
-:math:`K'`. Close to the edge of a strip the parameter turns back, and so does the correction.
+:math:`K'`. At the edge of a strip the parameter reverses, and the correction is reflected.
 
 Unknowns and right-hand sides are weighted by the square root of the arc length, which makes
 the EFIE's matrix symmetric and its norm that of the function space.
@@ -52,7 +52,7 @@ def strip_entries(
     rows, columns
         Indices of points.
     """
-    # Complex numbers as places: one subtraction, one absolute value.
+    # Positions as complex numbers: one subtraction and one absolute value give distances.
     place = strip.points @ np.array([1.0, 1.0j])
     root = np.sqrt(strip.weights)
     apart = np.abs(place[rows, None] - place[columns])
@@ -128,7 +128,7 @@ def conductors_matrix(
     Parameters
     ----------
     contours
-        Apart from each other by several steps of their grids.
+        Separated by several steps of their grids.
     wavenumber
         [rad/m].
     """
@@ -146,7 +146,7 @@ def conductors_matrix(
 def incident(
     contours: Sequence[Contour], source: LineSource, wavenumber: float
 ) -> Complex[np.ndarray, " points"]:
-    """Evaluate the weighted right-hand side that a source gives :func:`conductors_matrix`."""
+    """Evaluate the weighted right-hand side of a source for :func:`conductors_matrix`."""
     sides = []
     for contour in contours:
         field = source.field(contour.points, wavenumber)
@@ -161,7 +161,7 @@ def incident(
 def received(
     contours: Sequence[Contour], receiver: LineSource, wavenumber: float
 ) -> Complex[np.ndarray, " points"]:
-    """Evaluate what a receiver hears of each weighted unknown; a beam hears as it sends."""
+    """Return a receiver's response to each weighted unknown; a beam receives as it transmits."""
     return np.concatenate(
         [
             np.sqrt(contour.weights) * receiver.field(contour.points, wavenumber)

@@ -1,6 +1,6 @@
 r"""Fields scattered by one frozen profile: a conducting strip, or a board with a rough front.
 
-A function for those who have a profile and ask what full wave makes of it::
+For example::
 
     fields = profile_fields(
         np.stack([x, heights], axis=-1), frequencies, polarisation="TE",
@@ -9,10 +9,10 @@ A function for those who have a profile and ask what full wave makes of it::
     )
 
 Fields are those of unit line sources, :math:`-\tfrac j4 H_0^{(2)}(kr)`: of :math:`E_z` in TM, of
-:math:`H_z` in TE. What comes straight from the source is not in them.
+:math:`H_z` in TE, without the incident field.
 
-The board's front runs along the profile and looks to the left of its way (up, where x grows); its
-back is flat, parallel to the line between the profile's ends, and its four corners are sharp.
+The board's front follows the profile and faces left of its direction (up, if x rises); its back is
+flat, parallel to the line between the profile's ends, and its four corners are sharp.
 """
 
 import functools
@@ -35,13 +35,13 @@ from validation.full_wave.graded_contour import cornered_contour
 from validation.full_wave.line_source import LineSource
 
 POINTS_PER_WAVELENGTH = 6.5
-"""Grid points for each wavelength, in the denser medium: fields err by some 1e-5. [-]"""
+"""Grid points for each wavelength in the denser medium: the error of fields is some 1e-5. [-]"""
 
 Permittivity = complex | Callable[[Float[np.ndarray, " freqs"]], Complex[np.ndarray, " freqs"]]
 """ε' - jε'', one for all frequencies or a function of them in Hz. [-]"""
 
 Ends = Sequence[LineSource] | Float[np.ndarray, "_ _"]
-"""Sources or receivers; bare places are isotropic, third coordinates are left out."""
+"""Sources or receivers; bare positions are isotropic, third coordinates are ignored."""
 
 
 def profile_fields(
@@ -57,27 +57,28 @@ def profile_fields(
     folder: Path | None = None,
     workers: int = 1,
 ) -> Complex[np.ndarray, "*ends freqs"]:
-    """Solve for the field that a profile scatters from sources to receivers.
+    """Solve for the field scattered by a profile from sources to receivers.
 
     Parameters
     ----------
     profile
-        Points from end to end, that resolve the roughness. [m]
+        Points from end to end, which resolve the roughness. [m]
     frequencies
         Each is solved for. [Hz]
     polarisation
         TM (electric field along z) or TE (magnetic field along z).
     sources, receivers
-        Outside of the body; ``"echo"`` receives each source at its own place.
+        Outside of the body; ``"echo"``: each source receives its own echo.
     permittivity
-        Of a board; without it, the profile is a perfect conductor.
+        Of a board; None: the profile is a perfect conductor.
     thickness
-        From the line between the profile's ends to the back. A board needs it; a conductor without
-        it is a strip of no thickness. [m]
+        From the line between the profile's ends to the back; required for a board. None: a
+        conducting strip of zero thickness. [m]
     detail
         Largest step of the grid on the profile, a sixth of the roughness' correlation length. [m]
     folder
-        Keeps each frequency, under a name that tells all the above and the solver's version.
+        Cache of solved frequencies, whose file names depend on all of the above and the solver's
+        version.
     workers
         Frequencies at once.
 
@@ -149,7 +150,7 @@ def profile_body(
         return Body(contour=open_strip(profile, spacing=fine))
     if not thickness > 0:
         raise ValueError(f"thickness = {thickness} m must be positive")
-    front = profile[::-1, :2]  # its inside to the left, as that of a contour
+    front = profile[::-1, :2]  # with its inside to the left, as for a contour
     chord = front[0] - front[-1]
     back = np.array([chord[1], -chord[0]]) / np.hypot(*chord) * thickness
     corners = front[-1] + back, front[0] + back
@@ -193,11 +194,11 @@ SOLVER = (
     "log_quadrature",
     "profile_scattering",
 )
-"""Modules that a stored field depends on: those of another version are solved anew."""
+"""Modules on which a stored field depends: if their sources change, fields are solved again."""
 
 
 def keep(file: Path, fields: Complex[np.ndarray, "*n"]) -> None:
-    """Write an array aside, then rename: an interrupted run leaves no half file of that name."""
+    """Write an array to a temporary file and rename it: no partial file is left if interrupted."""
     aside = file.with_name(f"{file.stem}.{os.getpid()}.part")
     with aside.open("wb") as opened:
         np.save(opened, fields)

@@ -1,10 +1,9 @@
-"""A two-dimensional scenario as bodies that the full-wave solver takes, or why it cannot.
+"""Conversion of a two-dimensional scenario to bodies of the full-wave solver.
 
-A plate of metal is a strip of no thickness. A plate of a dielectric is a board: its face on the
-array's side lies where the plate does, and is as rough; its thickness lies behind, and its back is
-flat.
-Cylinders and boxes are solid: of metal, or of a dielectric all through, which only an opaque
-material (of infinite thickness) says.
+A metal plate is a strip of zero thickness. A dielectric plate is a board: its front, on the array's
+side, has the plate's position and roughness; its thickness extends behind it, and its back is flat.
+Cylinders and boxes are solid: of metal, or of a homogeneous dielectric, which is the meaning of an
+opaque material (of infinite thickness).
 """
 
 from collections.abc import Callable
@@ -29,20 +28,21 @@ from validation.full_wave.line_source import LineSource
 from validation.full_wave.profile_scattering import POINTS_PER_WAVELENGTH, profile_body
 
 PER_CORRELATION_LENGTH = 4.0
-"""Grid points for each correlation length: 1e-4 of a board's echo at slopes of 0.25 rms. [-]"""
+"""Grid points for each correlation length: the error of a board's echo is 1e-4 at slopes of 0.25
+rms. [-]"""
 
 PROFILE_POINTS = 10.0
-"""Points of a profile for each correlation length: a spline through fewer has jumps in its third
-derivative that are seen, 5e-4 of the echo at 4. [-]"""
+"""Points of a profile for each correlation length: jumps in the third derivative of a spline
+through fewer have an effect, 5e-4 of the echo at 4. [-]"""
 
 LEAST_GAP = 3.0
-"""Steps of the grid that bodies keep from each other, and antennas from bodies: a field that is
-not smooth from point to point is integrated wrongly. [-]"""
+"""Least distance of bodies from each other, and of antennas from bodies, in steps of the grid: the
+quadrature needs fields that are smooth from point to point. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioBodies:
-    """What stands in a scenario, sampled anew for each frequency."""
+    """The bodies of a scenario, sampled for each frequency."""
 
     names: tuple[str, ...]
     make: tuple[Callable[[float], Body], ...]  # from a frequency in Hz
@@ -53,19 +53,19 @@ class ScenarioBodies:
 
 
 def scenario_bodies(scenario: Scenario, *, seed: int, sample: int = 0) -> ScenarioBodies:
-    """Freeze a scenario's surfaces and make bodies of them.
+    """Freeze a scenario's surfaces and convert them to bodies.
 
     Parameters
     ----------
     scenario
         Two-dimensional.
     seed, sample
-        Which realisation; the simulator draws the same one.
+        Which realisation; the same as the simulator's.
 
     Raises
     ------
     ScenarioError
-        If something in the scenario cannot be solved for; all of it is listed.
+        If parts of the scenario cannot be solved for; the message lists all of them.
     """
     found = _general_problems(scenario)
     materials: dict[str, Material] = {}
@@ -88,7 +88,7 @@ def scenario_bodies(scenario: Scenario, *, seed: int, sample: int = 0) -> Scenar
 def line_source(
     scenario: Scenario, antenna: Antenna, position: Float[np.ndarray, " 3"]
 ) -> LineSource:
-    """Make a line source of an antenna; a Gaussian beam becomes one of complex place."""
+    """Return the line source of an antenna; a Gaussian beam has a complex position."""
     place = position[:2]
     if isinstance(antenna, GaussianBeam):
         aim = scenario.aim(antenna, position)[:2]
@@ -187,7 +187,7 @@ def _maker(
 
     match body:
         case Plate():
-            # A board looks to the left of its profile: towards the array.
+            # A board's front faces the left of its profile: towards the array.
             towards = scenario.base_station.element_positions.mean(axis=0) - body.centre
             front = line[::-1] if towards @ body.normal > 0 else line
             thickness = material.thickness if isinstance(material, Dielectric) else None
@@ -221,7 +221,7 @@ def _maker(
 def _sides(
     box: Box, mean: Float[np.ndarray, "vertices 2"], line: Float[np.ndarray, "vertices 2"]
 ) -> list[Float[np.ndarray, "_ 2"]]:
-    """Cut a box's outline at its corners."""
+    """Divide a box's outline at its corners."""
     along, across = box.length_m / 2 * box.tangent[:2], box.depth_m / 2 * box.across[:2]
     corners = [box.centre[:2] + one * along + two * across for one in (-1, 1) for two in (-1, 1)]
     at = sorted(int(np.argmin(np.hypot(*(mean - corner).T))) for corner in corners)
@@ -232,7 +232,7 @@ def _sides(
 
 
 def _gap_problems(scenario: Scenario, bodies: ScenarioBodies) -> list[str]:
-    """Name bodies and antennas that are too close to each other."""
+    """Return messages on bodies and antennas that are too close to each other."""
     frequency = float(scenario.radio.frequencies[-1])
     contours = [body.contour for body in bodies.at(frequency)]
     trees = [cKDTree(contour.points) for contour in contours]
@@ -263,7 +263,7 @@ def _gap_problems(scenario: Scenario, bodies: ScenarioBodies) -> list[str]:
 
 
 def _inside(contour: Contour, points: Float[np.ndarray, "points 2"]) -> np.ndarray:
-    """Tell which points a closed contour winds round."""
+    """Return which points are inside a closed contour, by its winding number."""
     if not contour.closed:
         return np.zeros(len(points), dtype=bool)
     away = contour.points - points[:, None]

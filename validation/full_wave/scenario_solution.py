@@ -1,9 +1,10 @@
-r"""A whole two-dimensional scenario by full wave, written as the simulator writes it.
+r"""Full-wave solution of a whole two-dimensional scenario, in the simulator's output format.
 
 Base station and users are line sources, as in the simulator's cylindrical waves: fields of unit
 line sources, :math:`-\tfrac j4 H_0^{(2)}(kr)`. All bodies and all bounces between them are solved
-for at once, at few frequencies of the band; the direct wave is added at all of them. What the radio
-adds (noise, clock) is drawn as in the simulator, from the same streams.
+together, at few frequencies of the band, and interpolated; the direct wave is added at every
+frequency. Impairments of the radio (noise, clock) are drawn as in the simulator, from the same
+random streams.
 """
 
 import os
@@ -29,20 +30,22 @@ from validation.full_wave.line_source import LineSource
 from validation.full_wave.scenario_bodies import ScenarioBodies, line_source, scenario_bodies
 
 SECONDS_PER_UNKNOWN = 2.5e-3
-"""On one core, for each frequency: 2 to 4 ms were seen for 1 000 to 9 000 unknowns. [s]"""
+"""Time on one core for each unknown and frequency: 2 to 4 ms were measured for 1 000 to 9 000
+unknowns. [s]"""
 
 RANK = 110
-"""Of the links of a board of 13 mm: what the memory is reckoned by. [-]"""
+"""Rank of the links of a board of 13 mm, by which memory is estimated. [-]"""
 
 MOST_UNKNOWNS = 40_000
-"""At the highest frequency: 3 m of metal, or half a metre of drywall, at 300 GHz, and some
-minutes for each frequency. [-]"""
+"""Most unknowns at the highest frequency: 3 m of metal, or half a metre of drywall, at 300 GHz, and
+some minutes for each frequency. [-]"""
 
 MOST_BYTES = 8 * 2**30
-"""Of all frequencies that are solved for at once. [B]"""
+"""Most memory of all frequencies that are solved for at once. [B]"""
 
 MOST_ERROR = 1e-3
-"""Of the interpolation over frequency, over the norm of a user's or the echo's field. [-]"""
+"""Largest error of interpolation over frequency, over the norm of a user's or the echo's field.
+[-]"""
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -50,26 +53,26 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """What a scenario's solution takes, as reckoned before it starts."""
+    """Estimated time and memory of a scenario's solution."""
 
     unknowns: int  # at the highest frequency
-    solutions: int  # frequencies that are solved for, if the fewest do
+    solutions: int  # frequencies to be solved for, if the smallest number suffices
     frequencies: int  # of the band
     workers: int  # frequencies at once
 
     @property
     def seconds(self) -> float:
-        """How long all solutions take. [s]."""
+        """Time of all solutions. [s]."""
         return SECONDS_PER_UNKNOWN * self.unknowns * self.solutions / self.workers
 
     @property
     def bytes(self) -> int:
-        """What the matrices take: leaves, and four factors of a link at each level. [B]."""
+        """Memory of the matrices: leaves, and four factors of a link at each level. [B]."""
         levels = max(1, round(np.log2(max(2.0, self.unknowns / LEAF))))
         return int(16 * self.unknowns * (LEAF + 5 * RANK * levels) * self.workers)
 
     def __str__(self) -> str:
-        """Say so in a line."""
+        """Return the estimate as a line of text."""
         took = f"{self.seconds / 60:.0f} min" if self.seconds > 90 else f"{self.seconds:.0f} s"
         return (
             f"full wave: {self.unknowns} unknowns, {self.solutions} of {self.frequencies} "
@@ -80,11 +83,11 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True)
 class FullWaveScenario:
-    """A scenario that is ready to be solved."""
+    """A checked scenario, prepared for its solution."""
 
     scenario: Scenario
     bodies: ScenarioBodies
-    elements: Float[np.ndarray, "elements 3"]  # where the array's antennas truly stand [m]
+    elements: Float[np.ndarray, "elements 3"]  # true positions of the array's antennas [m]
     seed: int
     sample: int
     polarisation: Polarisation
@@ -105,7 +108,7 @@ def full_wave_scenario(
     polarisation: Polarisation = "TM",
     workers: int | None = None,
 ) -> FullWaveScenario:
-    """Check whether a scenario can be solved for, and what it takes.
+    """Prepare a scenario for its solution, and estimate time and memory.
 
     Parameters
     ----------
@@ -121,7 +124,7 @@ def full_wave_scenario(
     Raises
     ------
     ScenarioError
-        If it cannot, or takes too much.
+        If it cannot be solved for, or exceeds the limits of unknowns or memory.
     """
     bodies = scenario_bodies(scenario, seed=seed, sample=sample)
     frequencies = scenario.radio.frequencies
@@ -163,25 +166,25 @@ def full_wave_scenario(
 def solve_scenario(
     ready: FullWaveScenario, *, progress: Progress | None = None
 ) -> tuple[Measurement, xr.Dataset]:
-    """Solve a scenario and record what its radio would.
+    """Solve a scenario, and add the impairments of its radio.
 
     Parameters
     ----------
     ready
         See :func:`full_wave_scenario`.
     progress
-        Told each frequency.
+        Called after each frequency.
 
     Returns
     -------
-    The measurement, and the truth behind it.
+    The measurement, and its ground truth.
 
     Raises
     ------
     FullWaveError
         If a solution does not satisfy its equation.
     ScenarioError
-        If nothing at all is received.
+        If nothing is received.
     """
     scenario, station = ready.scenario, ready.scenario.base_station
     fields = noise_free_fields(ready, progress=progress)
@@ -232,7 +235,7 @@ def noise_free_fields(
 
     def solved(wanted: Float[np.ndarray, " wanted"]) -> Complex[np.ndarray, "ways elements wanted"]:
         columns = []
-        # One thread of BLAS in each worker: sums do not depend on how many there are.
+        # One BLAS thread in each worker: sums do not depend on the number of workers.
         with threadpool_limits(limits=1):
             for column in _in_turn(one, wanted.tolist(), ready.effort.workers):
                 columns.append(column)
@@ -258,15 +261,14 @@ def _in_turn(
     pool = ThreadPoolExecutor(workers)
     try:
         yield from pool.map(one, wanted)
-    finally:  # an interruption does not wait for what has not begun
+    finally:  # if interrupted, pending tasks are cancelled
         pool.shutdown(cancel_futures=True)
 
 
 def _delays(ready: FullWaveScenario) -> tuple[Float[np.ndarray, "ways elements"], float]:
-    """Return the delay over the bodies' middle, of each way, and the largest departure [s].
+    """Return each link's delay over the bodies' middle, and the largest deviation from it [s].
 
-    Waves that go over two bodies arrive later than over either: by less than what lies between
-    these, there and back.
+    Waves over two bodies arrive later than over either, by less than twice the delay between them.
     """
     lowest = float(ready.scenario.radio.frequencies[0])
     contours = [body.contour.points for body in ready.bodies.at(lowest)]

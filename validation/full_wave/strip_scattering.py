@@ -1,14 +1,14 @@
 r"""Full-wave echo and uplinks of one rough conducting strip, frequency by frequency.
 
 The electric-field equation of :mod:`validation.full_wave.method_of_moments` by the hierarchical
-solver of :mod:`validation.full_wave.hodlr_solver`. An array that looks at a distant wall lights it
-in far fewer ways than it has positions: some of them are chosen and solved for, all others are
+solver of :mod:`validation.full_wave.hodlr_solver`. The fields of an array at a distant wall have a
+much lower rank than its number of positions: some are chosen and solved for, all others are
 interpolated, so that with the chosen fields :math:`F_J` and :math:`F = F_J T`
 
 .. math:: \mathrm{echo}_p = -f_p^T A^{-1} f_p = -t_p^T (F_J^T A^{-1} F_J)\, t_p, \qquad
           \mathrm{uplink}_p = -t_p^T F_J^T A^{-1} f_u
 
-Each solution is put back into a few rows of the equation.
+Each solution is checked by its residual in some rows of the equation.
 """
 
 import functools
@@ -32,14 +32,13 @@ from validation.full_wave.line_source import LineSource, greens_function
 from validation.full_wave.method_of_moments import strip_entries
 
 POINTS_PER_WAVELENGTH = 6.5
-"""Grid points for each wavelength: 1e-5 of the echo at 0.15 mm rms, l = 1 mm. [-]"""
+"""Grid points for each wavelength: the error of the echo is 1e-5 at 0.15 mm rms, l = 1 mm. [-]"""
 
 TOLERANCE = 1e-7
-"""Where ranks are cut; the echo then errs by some 1e-6. [-]"""
+"""Relative tolerance of ranks; the error of the echo is some 1e-6. [-]"""
 
 CHECKED, MOST_RESIDUAL = 16, 1e-4
-"""Rows that a solution is put into, and how far it may be off there, over the incident
-field. [-]"""
+"""Rows in which a solution is checked, and the largest residual over the incident field. [-]"""
 
 BLOCK = 16
 """Frequencies of one file. [-]"""
@@ -52,12 +51,12 @@ SOLVER = (
     "method_of_moments",
     "strip_scattering",
 )
-"""Modules that a stored solution depends on: those of another version are solved anew."""
+"""Modules on which a stored solution depends: if their sources change, it is solved again."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StripScene:
-    """A frozen strip, and who lights it. Third coordinates are left out."""
+    """A frozen strip, the array and the users. Third coordinates are ignored."""
 
     profile: Float[np.ndarray, "vertices axis"]  # points along the strip [m]
     positions: Float[np.ndarray, "positions axis"]  # of the array [m]
@@ -71,7 +70,7 @@ class StripScene:
 
     @property
     def digest(self) -> str:
-        """Tell this scene from others."""
+        """Return a digest of the scene."""
         numbers = [self.profile, self.positions, np.array([self.detail])]
         for user in self.users:
             aim = np.zeros(2) if user.aim is None else user.aim
@@ -113,7 +112,7 @@ def strip_response(scene: StripScene, frequency: float) -> Complex[np.ndarray, "
     wavenumber = 2 * np.pi * frequency / speed_of_light
     strip = scene.grid(frequency)
     root = np.sqrt(strip.weights)[:, None]
-    # Every position from some points, then some positions from every point.
+    # Positions are chosen by some points; then fields of the chosen ones at every point.
     thinned = np.arange(0, strip.count, max(1, strip.count // (2 * len(scene.positions) + 64)))
     chosen, spread = chosen_columns(
         _lit(strip, scene.positions[:, :2], wavenumber, thinned), TOLERANCE
@@ -150,7 +149,7 @@ def strip_fields(
     workers: int | None = None,
     advance: Callable[[int, int], None] = lambda done, steps: None,
 ) -> StripFields:
-    """Solve for many frequencies; what lies in a folder from an earlier run is not done again.
+    """Solve for many frequencies; stored results of an earlier run are reused.
 
     Parameters
     ----------
@@ -159,8 +158,8 @@ def strip_fields(
     frequencies
         [Hz].
     folder
-        Where every :data:`BLOCK` frequencies are kept, under a name that tells scene, frequencies
-        and the solver's version. Without it, nothing is.
+        Cache with a file for every :data:`BLOCK` frequencies, whose name depends on scene,
+        frequencies and the solver's version. None: nothing is stored.
     workers
         Frequencies at once; by default, one on each core. The result is the same.
     advance
@@ -170,7 +169,7 @@ def strip_fields(
     solved = []
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    # One thread of BLAS in each worker: sums do not depend on how many there are.
+    # One BLAS thread in each worker: sums do not depend on the number of workers.
     with threadpool_limits(limits=1), ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         for done, block in enumerate(blocks):
             file = None if folder is None else folder / f"{_name(scene, block)}.npz"
@@ -213,7 +212,7 @@ def _name(scene: StripScene, block: Float[np.ndarray, " freqs"]) -> str:
 
 
 def _keep(file: Path, fields: Complex[np.ndarray, "ways positions freqs"]) -> None:
-    # Written aside, then renamed: an interrupted run leaves no half file under the name.
+    # A temporary file is renamed: no partial file is left if interrupted.
     aside = file.with_name(f"{file.stem}.{os.getpid()}.part")
     with aside.open("wb") as opened:
         np.savez(opened, fields=fields)

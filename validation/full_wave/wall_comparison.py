@@ -4,9 +4,9 @@ r"""Physical optics against a two-dimensional full-wave solution, on its own wal
 ``echo``, ``uplink_isotropic`` and ``uplink_beam`` (any of them), ``wall_profile``,
 ``aperture_position``, ``frequency`` and, with an uplink, ``user_position``.
 
-The full-wave beam is a complex source: the user's line source is moved by the imaginary
-distance :data:`BEAM_PARAMETER` against its aim, which is an exact solution of the wave
-equation, close to a Gaussian of width :math:`1/\sqrt{kb}`.
+The full-wave beam is a complex source: the user's line source is displaced by the imaginary
+distance :data:`BEAM_PARAMETER` against its aim, an exact solution of the wave equation, close to a
+Gaussian of width :math:`1/\sqrt{kb}`.
 """
 
 import sys
@@ -25,24 +25,24 @@ from simulator.geometry.ray_scene import build_scene, facets_visible
 from simulator.scattering.physical_optics import scattered
 
 BEAM_PARAMETER = 0.097
-"""Imaginary displacement b of the reference's complex source. Its file does not state it; the
-method of moments finds it to five digits, and agrees to 2e-7 with it. [m]"""
+"""Imaginary displacement b of the reference's complex source. It is not in the file, but was fitted
+to five digits by the method of moments, which then agrees to 2e-7. [m]"""
 
 BEAM_NODES = 4
-"""Frequencies that the beam is sampled at: exp(kb(cos ψ − 1)) varies by e^{±0.4} over the
-band where it is not yet small. [-]"""
+"""Frequencies at which the beam is sampled: exp(kb(cos ψ − 1)) varies by e^{±0.4} over the band, as
+long as it is not small. [-]"""
 
 COMPARED = ("echo", "uplink_isotropic", "uplink_beam")
 
 LEAST_CORRELATION = 0.99
 MOST_LEVEL_DB = 2.0
-"""Physical optics reaches 0.993 and 1.1 dB (echo), 0.996…0.999 and 0.5 dB (uplinks) at
-0.15 mm rms; 0.99 and 2 dB leave room for other realisations. [-], [dB]"""
+"""Limits of agreement. Physical optics reaches 0.993 and 1.1 dB (echo), 0.996…0.999 and 0.5 dB
+(uplinks) at 0.15 mm rms; 0.99 and 2 dB are a margin for other realisations. [-], [dB]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """How one simulated array compares with the full-wave one."""
+    """Agreement of one simulated array with the full-wave one."""
 
     name: str
     correlation: float  # magnitude of the complex correlation [-]
@@ -72,7 +72,7 @@ def compare_with_full_wave(path: Path) -> tuple[Agreement, ...]:
 def simulated_links(
     reference: Mapping[str, np.ndarray],
 ) -> dict[str, Complex[np.ndarray, "positions freqs"]]:
-    """Simulate what a reference holds of echo and uplinks, on its wall, in cylindrical waves.
+    """Simulate a reference's echo and uplinks on its wall, in cylindrical waves.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def simulated_links(
 
 
 def complex_source_beam(aim: Float[np.ndarray, " 3"]) -> Pattern:
-    """Return the field of a line source at a complex place, over that of a real one.
+    """Return the field of a line source at a complex position over that at the real one.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def complex_source_beam(aim: Float[np.ndarray, " 3"]) -> Pattern:
     ) -> Complex[np.ndarray, "nodes facets"]:
         along = distances * (directions @ axis)
         across = distances**2 - along**2
-        # The far root: the wave runs away from the source, strongest along the aim.
+        # This root gives an outgoing wave, strongest along the aim.
         distance = np.sqrt((along + 1j * BEAM_PARAMETER) ** 2 + across)
         excess = np.where(distance.real < 0, -distance, distance) - distances
         wavenumbers = 2 * np.pi * frequencies[:, None] / speed_of_light
@@ -135,13 +135,13 @@ def read_reference(path: Path) -> dict[str, np.ndarray]:
     Raises
     ------
     MeasurementError
-        If it is no such file, an array that is needed is missing, or one has another shape.
+        If it is not such a file, a required array is missing, or one has another shape.
     """
     try:
-        # Opened here: NumPy leaves the file of a damaged archive open.
+        # Opened here because NumPy does not close the file of a damaged archive.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    except Exception as error:  # NumPy, zip and zlib fail in many ways on a foreign file
+    except Exception as error:  # NumPy, zip and zlib raise many exceptions on a foreign file
         raise MeasurementError(f"{path}: not an .npz of plain arrays ({error})") from error
     needed = ["wall_profile", "aperture_position", "frequency"]
     if any(name.startswith("uplink") for name in arrays):
@@ -179,7 +179,7 @@ def _agreement(
 
 
 def main() -> int:
-    """Compare the file named on the command line; 1 if it falls short."""
+    """Compare the file named on the command line; return 1 if agreement is insufficient."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2

@@ -1,7 +1,7 @@
-"""Rooms that nobody drew: a written prior over rooms, and how the estimator fares in them.
+"""Random rooms: a stated prior over rooms, and the estimator's performance in them.
 
-Rooms for tuning and rooms for judging have seeds of their own. An oracle that is given the true
-walls and paths says what could be answered; scores compare. Rooms drawn by hand are those of
+Rooms for tuning and rooms for judging have separate seeds. An oracle with the true walls and paths
+determines which users can be located; estimates are scored. Rooms designed by hand are those of
 :mod:`validation.trials.trap_rooms`.
 """
 

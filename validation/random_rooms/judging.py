@@ -1,4 +1,4 @@
-"""Rooms drawn, simulated, located and scored, several at a time; what is done is kept."""
+"""Random rooms: drawn, simulated, located and scored, with several workers and a cache."""
 
 import json
 import multiprocessing
@@ -30,7 +30,7 @@ def judge_rooms(
     keep: Path | None = None,
     tell: Callable[[int, int], None] = lambda done, count: None,
 ) -> tuple[RoomScore, ...]:
-    """Answer random rooms, and score the answers.
+    """Locate the users of random rooms, and score the estimates.
 
     Parameters
     ----------
@@ -41,12 +41,11 @@ def judge_rooms(
     purpose
         Rooms to tune on, or to judge by.
     workers
-        Processes that share the rooms, each of one thread; 1: this one, of all threads.
+        Processes with one thread each; 1: this process, with all threads.
     keep
-        A folder for the simulated measurements, so that they are simulated once: the code that
-        simulates must not change between.
+        Cache of simulated measurements; invalid if the simulator's code has changed.
     tell
-        Told the rooms done, and how many there are.
+        Called with the numbers of rooms done and in all.
 
     Returns
     -------
@@ -61,7 +60,7 @@ def judge_rooms(
 
 
 def judge_room(kind: str, number: int, *, purpose: Purpose, keep: Path | None = None) -> RoomScore:
-    """Answer one random room and score the answer; see :func:`judge_rooms`."""
+    """Locate the user of one random room and score the estimate; see :func:`judge_rooms`."""
     scenario = draw_room(kind, number, purpose=purpose)
     measurement, truth = measured_room(scenario, number, purpose=purpose, keep=keep)
     started = time.perf_counter()
@@ -79,7 +78,7 @@ def scored(
     seconds: float,
     oracle: Answerable | None = None,
 ) -> RoomScore:
-    """Score an estimate of a room of one user; the oracle is asked if it was not before."""
+    """Score an estimate in a room of one user; the oracle is run if its result is not given."""
     (uplink,) = measurement.uplinks
     asked = oracle or ask_oracle(scenario, USER, measurement.echo, uplink, truth)
     return score_room(
@@ -90,7 +89,7 @@ def scored(
 def measured_room(
     scenario: Scenario, number: int, *, purpose: Purpose, keep: Path | None = None
 ) -> tuple[Measurement, Truth]:
-    """Simulate a random room, or read what was simulated before."""
+    """Simulate a random room, or read its measurement from the cache."""
     store = None if keep is None else keep / f"{scenario.name}.zarr"
     if store is not None and store.exists():
         return read_measurement(store), read_truth(store)
@@ -106,13 +105,13 @@ def _each(
     if workers == 1:
         yield from map(judge, numbers)
         return
-    # Dr.Jit's threads do not survive a fork.
+    # Spawned, not forked: Dr.Jit's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
     with context.Pool(workers, initializer=compute_in_one_thread) as pool:
         yield from pool.imap(judge, numbers)
 
 
 def write_scores(path: Path, scores: Sequence[RoomScore]) -> None:
-    """Keep scores as JSON, one room a line."""
+    """Write scores as JSON, one room per line."""
     lines = ",\n".join(json.dumps(asdict(score)) for score in scores)
     path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")

@@ -1,15 +1,15 @@
-"""What could be answered of a room, told by one who knows its walls and paths.
+"""Oracle with the true walls and paths of a room: which users can be located.
 
-The echo *shows* a wall where its image, smoothed over three cells along the wall, is at least
-:data:`SHOWN_DB` over the background and :data:`BESIDE_DB` over what is four cells beside it on
-either side, on at least :data:`SHOWN_CELLS` cells of it that lie in the imaged sector in plain
-sight of the array: a line that an eye sees.
+The echo *shows* a wall if its image, smoothed over three cells along the wall, is at least
+:data:`SHOWN_DB` above the background and :data:`BESIDE_DB` above the level four cells beside it on
+either side, on at least :data:`SHOWN_CELLS` cells of it that are in the imaged sector and in line
+of sight of the array: a line visible to the eye.
 
-A user can be *answered* if the strongest specular path of its pilot is well above the noise, is no
-small part of the pilot, comes from the imaged sector and meets walls only that the echo shows.
-That is an upper bound for an estimator that knows nothing: the oracle does not ask whether other
-explanations can be ruled out. How well it could be answered is the Cramér-Rao bound with all walls
-known, no roughness.
+A user is *answerable* if the strongest specular path of its pilot is well above the noise, has a
+large share of the pilot's energy, arrives from the imaged sector and is reflected only by walls
+that the echo shows. This is an upper bound for an estimator without prior knowledge: the oracle
+does not test whether other explanations can be excluded. The attainable accuracy is the Cramér-Rao
+bound with all walls known and no roughness.
 """
 
 from collections.abc import Sequence
@@ -32,24 +32,26 @@ from validation.bounds.scenario_bound import UserWaves, scenario_position_bound,
 from validation.metrics.truth import Truth
 
 SHOWN_DB = 10.0
-"""Mean intensity over the background from which a part of a wall shows. [dB]"""
+"""Least mean intensity of a visible part of a wall, relative to the background. [dB]"""
 BESIDE_DB = 3.0
-"""The same over what is to either side of it: a sidelobe of something else is as bright there."""
+"""The same relative to the levels beside it: a sidelobe of another object is as bright there.
+[dB]"""
 BESIDE_CELLS = 4.0
-"""How far to the side. The survey's taper has its first nulls at 2 to 3 cells. [cells]"""
+"""Distance to the side: the survey's taper has its first nulls at 2 to 3 cells. [cells]"""
 SHOWN_CELLS = 7.0
-"""Cells of a wall that must show. [-]"""
+"""Least number of visible cells of a wall. [-]"""
 SMOOTHED = 3
 """Cells over which speckle is averaged. [-]"""
 PLACES_PER_CELL = 2.0
 FEWEST_PLACES, MOST_PLACES = 32, 2000
 BACKGROUND_PLACES = 4000
-"""Points of the sector whose median is the background: known to 2 %. [-]"""
+"""Points of the sector whose median is the background, with an error of 2 %. [-]"""
 
 LEAST_SNR_DB = 20.0
-"""Energy of a path over the noise's spectral density: its angle is known to a tenth of a cell."""
+"""Least energy of a path over the noise's spectral density: the error of its angle is a tenth of a
+cell. [dB]"""
 LEAST_SHARE = 0.2
-"""Of the pilot's energy that the strongest specular path must have. [-]"""
+"""Least share of the pilot's energy in the strongest specular path. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,30 +66,30 @@ class TruePath:
 
 @dataclass(frozen=True, kw_only=True)
 class Answerable:
-    """What an oracle says of a room."""
+    """Result of the oracle for a room."""
 
     shown: tuple[str, ...]  # walls that the echo shows
     paths: tuple[TruePath, ...]  # strongest first
     answerable: bool
-    why: str  # or why not
-    deviation: float | None  # largest, of the position, by the bound; None without one [m]
+    why: str  # reason, if not
+    deviation: float | None  # bound of the position's largest deviation; None without one [m]
 
 
 def ask_oracle(
     scenario: Scenario, user: str, echo: Echo | None, uplink: Uplink, truth: Truth
 ) -> Answerable:
-    """Tell what could be answered of one user.
+    """Return whether one user can be located, and how accurately.
 
     Parameters
     ----------
     scenario
-        The true room, its array at the origin, its boresight along +y.
+        The true room, with the array at the origin and boresight along +y.
     user
         Its name.
     echo, uplink
         The measurement.
     truth
-        The same room's walls.
+        Of the same room.
     """
     sector = imaged_sector(echo) if echo is not None else None
     shown = () if echo is None or sector is None else shown_walls(echo, sector, truth)
@@ -116,7 +118,7 @@ def ask_oracle(
 
 
 def true_paths(scenario: Scenario, user: str, uplink: Uplink) -> tuple[TruePath, ...]:
-    """Trace a user's specular paths, and compare them with its pilot; strongest first."""
+    """Return a user's specular paths with their share of its pilot, strongest first."""
     try:
         waves = user_waves(scenario, user)
     except NoBound:
@@ -150,7 +152,7 @@ def _arrival_sine(waves: UserWaves, mirrors: Sequence[int], user: Float[np.ndarr
 
 @dataclass(frozen=True, kw_only=True)
 class ImagedSector:
-    """What an echo images."""
+    """The sector imaged by an echo."""
 
     widest: float  # sine [-]
     nearest: float  # [m]
@@ -159,14 +161,14 @@ class ImagedSector:
     flat: bool
 
     def holds(self, points: Float[np.ndarray, "points 3"]) -> Bool[np.ndarray, " points"]:
-        """Tell which points are imaged."""
+        """Return which points are in the sector."""
         far = np.linalg.norm(points, axis=-1)
         aside = np.maximum(np.abs(points[:, 0]), np.abs(points[:, 2])) / far
         held = (points[:, 1] > 0) & (aside <= self.widest)
         return np.asarray(held & (far >= self.nearest) & (far <= self.farthest))
 
     def scattered(self) -> Float[np.ndarray, "points 3"]:
-        """Spread points evenly over the sector. [m]."""
+        """Return points spread evenly over the sector. [m]."""
         rng = np.random.default_rng(0)
         sines = rng.uniform(-self.widest, self.widest, (BACKGROUND_PLACES, 2))
         if self.flat:
@@ -177,7 +179,7 @@ class ImagedSector:
 
 
 def imaged_sector(echo: Echo) -> ImagedSector:
-    """Return the sector of a linear or a planar array at the origin, its boresight along +y."""
+    """Return the sector of a linear or planar array at the origin, with boresight along +y."""
     if np.ptp(echo.positions[:, 2]) == 0:
         nearest, farthest = echo_reach(echo)
         widest, resolution, flat = imaged_sine(echo), echo_resolution(echo), True
@@ -192,7 +194,7 @@ def imaged_sector(echo: Echo) -> ImagedSector:
 
 
 def shown_walls(echo: Echo, sector: ImagedSector, truth: Truth) -> tuple[str, ...]:
-    """Name the walls that the echo shows."""
+    """Return the names of the walls that the echo shows."""
     taper = survey_weights(echo)
 
     def intensity(points: Float[np.ndarray, "points 3"]) -> Float[np.ndarray, " points"]:
@@ -229,7 +231,7 @@ def shown_walls(echo: Echo, sector: ImagedSector, truth: Truth) -> tuple[str, ..
 def _hidden(
     points: Float[np.ndarray, "points 3"], name: str, truth: Truth
 ) -> Bool[np.ndarray, " points"]:
-    """Tell which points another wall or a body stands before, in plan, seen from the origin."""
+    """Return which points are hidden from the origin by another wall or a body, in plan."""
     hidden = np.zeros(len(points), dtype=bool)
     for other in truth.wall_start:
         if other != name:
@@ -249,7 +251,7 @@ def _crossed(
     start: Float[np.ndarray, " 3"],
     end: Float[np.ndarray, " 3"],
 ) -> Bool[np.ndarray, " points"]:
-    """Tell which straight ways from the origin cross a segment, in plan."""
+    """Return which straight lines from the origin cross a segment, in plan."""
 
     def turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])

@@ -1,26 +1,27 @@
-"""The prior over random rooms, in words and numbers, and the rooms drawn from it.
+"""The prior distribution of random rooms, and rooms drawn from it.
 
 A room of the set ``plain`` has a linear array of 128 elements of 0.5 mm and 501 points over 220 to
 295 GHz (unambiguous to 1 m of echo, 2 m of path); one to three plates of metal, drywall or glass,
-8 to 30 cm long, their centres at x = −0.35 to 0.35 and y = 0.25 to 0.6 m, turned anyhow, each with
+8 to 30 cm long, their centres at x = −0.35 to 0.35 and y = 0.25 to 0.6 m, at any angle, each with
 Gaussian heights of 0.02 to 0.15 mm rms and 0.4 to 2 mm correlation length; none to two metal posts
-of 3 to 12 mm radius; a user at x = −0.5 to 0.5, y = 0.1 to 0.8 m, who in half of the rooms
-sends everywhere and in half a Gaussian beam of 0.08 to 0.5 rad at one of the plates; noise of 0 to
-30 dB; and waves that meet one surface, in a fifth of the rooms two. All are uniform and
-independent. What cannot be (bodies that cross, a user in a body) is drawn again.
+of 3 to 12 mm radius; a user at x = −0.5 to 0.5, y = 0.1 to 0.8 m, with an isotropic antenna in half
+of the rooms and a Gaussian beam of 0.08 to 0.5 rad aimed at one of the plates in the others; an SNR
+of 0 to 30 dB; and up to one bounce, in a fifth of the rooms two. All are uniform and independent.
+Impossible rooms (bodies that intersect, a user in a body) are drawn again.
 
 The other sets differ from it:
 
 ``bodies``
-    One or two more things stand in the room: boxes of metal, chipboard or cardboard, 6 to 15 cm by
-    4 to 10 cm, or absorbing screens of 8 to 25 cm, anywhere the plates may be.
+    One or two more objects: boxes of metal, chipboard or cardboard, 6 to 15 cm by 4 to 10 cm, or
+    absorbing screens of 8 to 25 cm, in the same region as the plates.
 ``bounces``
-    Waves meet two surfaces in half of the rooms, three in the other half.
+    Up to two bounces in half of the rooms, three in the other half.
 ``bands``
-    The band's lower end is anywhere from 24 to 300 GHz, all octaves alike (at most 330 GHz), its
-    width 12 to 30 % of it; 16 to 300 elements, 0.43 shortest wavelengths apart. Where the aperture
-    is wider than that of ``plain``, lengths grow with it, up to five times; heights grow with the
-    wavelength. Plates are of metal or drywall: the permittivity of glass is not known at all bands.
+    The band's lower end is log-uniform from 24 to 300 GHz (upper end at most 330 GHz), its width 12
+    to 30 % of it; 16 to 300 elements, 0.43 shortest wavelengths apart. If the aperture is wider
+    than that of ``plain``, lengths are scaled with it, up to five times; heights are scaled with
+    the wavelength. Plates are of metal or drywall: the permittivity of glass is not known at all
+    bands.
 ``space``
     In three dimensions: 16 x 16 elements 2.4 mm apart, 57 to 64 GHz in 41 points; one or two
     upright plates of metal, 0.3 to 0.6 m wide and 0.3 to 0.5 m high, 0.7 to 1.2 m away within 0.4 m
@@ -40,10 +41,10 @@ Purpose = Literal["tuning", "judging"]
 Tables = dict[str, object]
 
 SEEDS: Mapping[Purpose, int] = {"tuning": 1801, "judging": 5417}
-"""Seeds of the rooms, of their surfaces and of their noise: never the same for both purposes."""
+"""Seeds of the rooms, their surfaces and noise, different for both purposes."""
 
 MOST_TRIES = 1000
-"""Draws of one room: some 1 of 2 is possible, so that all fail once in 2^1000."""
+"""Most draws of one room: about half of the draws are possible. [-]"""
 
 USER = "user"
 """Name of the only user."""
@@ -54,7 +55,7 @@ _MOST_GROWN = 5.0
 
 
 def draw_room(kind: str, number: int, *, purpose: Purpose) -> Scenario:
-    """Draw a room; it depends on the three arguments alone.
+    """Draw a room, which depends on the three arguments alone.
 
     Parameters
     ----------
@@ -220,7 +221,7 @@ def _space(rng: np.random.Generator) -> Tables:
 
 
 def _antenna(rng: np.random.Generator, plates: list[str], *, narrowest: float) -> Tables:
-    """Draw a beam of at least that width [rad] at one of the walls, or none: isotropic."""
+    """Draw a beam of at least some width [rad] aimed at a wall, or an isotropic antenna."""
     if rng.random() >= 0.5:
         return {}
     beam = {
@@ -238,7 +239,7 @@ def _centre(rng: np.random.Generator, size: float = 1.0) -> list[float]:
 def _place(
     rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], size: float
 ) -> list[float]:
-    """Draw a place in a box that grows about the array. [m]."""
+    """Draw a position in a box that is scaled about the array. [m]."""
     return [round(size * float(value), 4) for value in rng.uniform(low, high)]
 
 
@@ -251,7 +252,7 @@ def _roughness(rng: np.random.Generator, height: float = 1.0) -> Tables:
 
 
 def _rounded(rng: np.random.Generator, low: float, high: float, digits: int) -> float:
-    """Draw a number of few digits, so that a written room is the room."""
+    """Draw a number of few digits, so that writing the room to a file is lossless."""
     return round(float(rng.uniform(low, high)), digits)
 
 
@@ -262,4 +263,4 @@ SETS: Mapping[str, Callable[[np.random.Generator], Tables]] = {
     "bands": _bands,
     "space": _space,
 }
-"""How a room of each set is drawn."""
+"""Function that draws a room of each set."""

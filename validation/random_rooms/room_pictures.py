@@ -1,4 +1,4 @@
-"""Random rooms as pictures: what was found, over the true walls and users."""
+"""Figures of random rooms: the estimates, over the true walls and users."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from validation.random_rooms.prior import SEEDS, Purpose, draw_room
 
 
 def draw_rooms(figure: Figure, kind: str, numbers: Sequence[int], *, purpose: Purpose) -> None:
-    """Draw rooms of a two-dimensional set side by side, each answered anew."""
+    """Locate and draw rooms of a two-dimensional set side by side."""
     for index, number in enumerate(numbers):
         axes = figure.add_subplot(1, len(numbers), index + 1)
         scenario = draw_room(kind, number, purpose=purpose)

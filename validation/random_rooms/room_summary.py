@@ -1,4 +1,4 @@
-"""The scores of many random rooms, summed up: what was right, wrong, left open, missed, false."""
+"""Summary of the scores of many random rooms: right, wrong, ambiguous, missed and false answers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from validation.metrics.coverage import Coverage, coverage
 from validation.random_rooms.room_score import CONFIDENT, RoomScore, Verdict
 
 BINS = (0.0, 0.25, 0.5, 0.75, 0.9, 0.99, 0.999, 1.0)
-"""Edges of the stated probabilities that are counted together. [-]"""
+"""Edges of the bins of stated probabilities. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stated:
-    """Places named with like probabilities, and how many were right."""
+    """Positions with stated probabilities in one bin, and the number that were right."""
 
     low: float
     high: float
@@ -26,30 +26,30 @@ class Stated:
 
 @dataclass(frozen=True, kw_only=True)
 class RoomSummary:
-    """What the answers to many rooms come to."""
+    """Counts of the answers to many rooms."""
 
     rooms: int
     verdicts: dict[Verdict, int]
     answerable: int  # rooms that the oracle answers
-    answered: int  # of these, found and right
+    answered: int  # of these, with the status found and right
     walls_shown: int  # by the echo
     walls_found: int  # of these
-    walls_right: int  # mirrors on true walls, shown by the echo or not
+    walls_right: int  # mirrors on true walls, visible in the echo or not
     false_mirrors: int  # with confidence above 0.99
     doubtful_mirrors: int  # false ones with less
     false_targets: int
     targets_on_walls: int
     targets: int
-    region: Coverage | None  # of the 95 % regions of the places that were found
+    region: Coverage | None  # of the 95 % regions of positions found
     wall_region: Coverage | None  # of those of the walls, in 2-D
     stated: tuple[Stated, ...]
     wrong: tuple[str, ...]  # rooms answered wrongly
-    worst_error: float  # of what was found [m]
+    worst_error: float  # of positions found [m]
     seconds: float  # median of the estimates' durations
 
 
 def summarise(scores: Sequence[RoomScore]) -> RoomSummary:
-    """Sum up scores.
+    """Summarise scores.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def _reliability(scores: Sequence[RoomScore]) -> tuple[Stated, ...]:
 
 
 def table_rows(summary: RoomSummary) -> tuple[tuple[str, str], ...]:
-    """Lay a summary out: what is counted, and how many."""
+    """Return the lines of a summary: description and value."""
     counts = summary.verdicts
     rows = [
         ("rooms", f"{summary.rooms}"),

@@ -1,4 +1,4 @@
-"""Full-wave reference data, decimated: see README.md beside it for where it comes from."""
+"""Full-wave reference data, decimated; their origin is described in the README.md beside it."""
 
 from pathlib import Path
 

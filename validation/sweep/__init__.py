@@ -1,7 +1,7 @@
 """Sweeps: errors over a grid of a scenario's keys, with bounds; tables and figures.
 
-What was computed is kept under a digest of all that it depends on, so a sweep can be interrupted
-and extended.
+Results are cached under a digest of all that they depend on, so that a sweep can be interrupted and
+extended.
 """
 
 import lazy_loader

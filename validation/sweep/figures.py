@@ -1,4 +1,4 @@
-"""Figures of a sweep: errors against what is swept, with their bound, and their distribution.
+"""Figures of a sweep: errors over the swept key, with their bound, and their distribution.
 
 Each function draws on an Axes and returns it.
 """
@@ -20,13 +20,13 @@ Case = list[Outcome]
 def draw_errors(ax: Axes, outcomes: Sequence[Outcome], config: SweepConfig) -> Axes:
     """Draw median, 90 % and worst error against the swept key, with the error bounds.
 
-    A user that was not found counts as infinitely far off, so that a curve ends where its share
-    is no longer found.
+    The error of a user that was not found is infinite, so that a curve ends where its share of
+    users is no longer found.
 
     Parameters
     ----------
     ax
-        Is given a logarithmic axis of errors in millimetres.
+        Its axis of errors, in millimetres, becomes logarithmic.
     outcomes, config
         Of the sweep; each combination of the other swept keys has a colour.
     """
@@ -73,9 +73,9 @@ def draw_distribution(ax: Axes, outcomes: Sequence[Outcome], config: SweepConfig
     Parameters
     ----------
     ax
-        Is given a logarithmic axis of errors in millimetres.
+        Its axis of errors, in millimetres, becomes logarithmic.
     outcomes, config
-        Of the sweep; other swept keys than the axis' are taken together.
+        Of the sweep; other swept keys than the axis' are merged.
     """
     cases: dict[str, Case] = {}
     for one in outcomes:

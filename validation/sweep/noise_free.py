@@ -1,9 +1,9 @@
-"""Noise-free measurements, kept: what does not depend on noise is simulated once.
+"""Cache of noise-free measurements: the part independent of noise is simulated once.
 
-A measurement is what the antennas would receive (the scene, its roughness, where they truly
-stand) and what the receiver makes of it (noise, drift, clock, converter). The first takes seconds
-and is stored under a digest of all that it depends on, the code included; the second is drawn
-anew. Together they are what :func:`simulator.simulation.simulate` gives, bit for bit.
+A measurement consists of the received fields (the scene, its roughness, true antenna positions)
+and the receiver's impairments (noise, drift, clock, converter). The former take seconds and are
+stored under a digest of all that they depend on, code included; the latter are drawn each time.
+Together they equal the result of :func:`simulator.simulation.simulate`, bit for bit.
 """
 
 import fcntl
@@ -28,7 +28,7 @@ from simulator.receiver.receiver import received
 
 
 def without_receiver(scenario: Scenario) -> Scenario:
-    """Return the scenario with a receiver that adds nothing; its antennas stand where they did."""
+    """Return the scenario with an ideal receiver, and the same true antenna positions."""
     jitter = scenario.impairments.position_jitter_mm
     quiet = {"noise": Noise(), "impairments": Impairments(position_jitter_mm=jitter)}
     return scenario.model_copy(update=quiet)
@@ -47,9 +47,9 @@ def content_key(scenario: Scenario, *, seed: int, sample: int, packages: tuple[s
     Parameters
     ----------
     scenario, seed, sample
-        What is computed.
+        Of the computation.
     packages
-        Ours that do so.
+        Our packages on whose code it depends.
     """
     content = {
         "scenario": content_text(tomllib.loads(scenario_to_toml(scenario))),
@@ -62,15 +62,15 @@ def content_key(scenario: Scenario, *, seed: int, sample: int, packages: tuple[s
 
 
 def noise_free(scenario: Scenario, *, seed: int, sample: int, folder: Path) -> Measurement:
-    """Return a scenario's noise-free measurement, from the folder if it is there.
+    """Return a scenario's noise-free measurement, from the cache if it is there.
 
     Parameters
     ----------
     scenario, seed, sample
         As for :func:`simulator.simulation.simulate`; the receiver's part is left out.
     folder
-        Where such measurements are kept. A store that cannot be read is made again; two
-        processes that need the same one do not both make it.
+        The cache. A store that cannot be read is simulated again; if two processes need the same
+        one, only one simulates it.
     """
     path = folder / f"{noise_free_key(scenario, seed=seed, sample=sample)}.zarr"
     with _locked(path.with_suffix(".lock")):
@@ -78,7 +78,7 @@ def noise_free(scenario: Scenario, *, seed: int, sample: int, folder: Path) -> M
             try:
                 return read_measurement(path)
             except MeasurementError:
-                pass  # such as half of one, after a power cut
+                pass  # for instance, incomplete after a power failure
         from simulator.simulation import simulate  # Sionna's import takes seconds
 
         made = simulate(without_receiver(scenario), seed=seed, sample=sample).measurement
@@ -87,7 +87,7 @@ def noise_free(scenario: Scenario, *, seed: int, sample: int, folder: Path) -> M
 
 
 def with_receiver(quiet: Measurement, scenario: Scenario, *, seed: int, sample: int) -> Measurement:
-    """Return what the scenario's receiver makes of a noise-free measurement.
+    """Add the impairments of the scenario's receiver to a noise-free measurement.
 
     Parameters
     ----------

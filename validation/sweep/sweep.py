@@ -1,8 +1,8 @@
-"""Sweeps: how far off users are located, over a grid of a scenario's keys and many realisations.
+"""Sweeps: position errors over a grid of a scenario's keys and many realisations.
 
-Each point is simulated, estimated and compared by itself, and its outcome kept under a digest of
-all that it depends on. So a sweep that was interrupted goes on; one that is extended computes
-only what is new; and where only the noise differs, the noise-free measurement is taken from disk.
+Each point is simulated, estimated and compared independently, and its outcome cached under a digest
+of all that it depends on. So an interrupted sweep resumes, an extended one computes only new
+points, and points that differ only in noise share the noise-free measurement.
 """
 
 import json
@@ -34,14 +34,14 @@ from validation.metrics.truth import Truth, truth_from_dataset
 from validation.sweep.noise_free import content_key, noise_free, with_receiver
 
 PACKAGES = ("scenes", "simulator", "estimator", "validation")
-"""Ours whose code an outcome depends on."""
+"""Our packages on whose code an outcome depends."""
 
 Tally = Callable[[int, int, int], None]
-"""Told how many points are done (the failed ones included), have failed, and there are in all."""
+"""Called with the numbers of points done (failed ones included), failed, and in all."""
 
 
 class SweepConfig(Variations):
-    """What a sweep's TOML file holds."""
+    """Contents of a sweep's TOML file."""
 
     title: str = Field("", max_length=200, description="what it shows, in a line")
     realisations: int = Field(
@@ -102,7 +102,7 @@ class SweepConfig(Variations):
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How far off one user was located at one point."""
+    """Result for one user at one point: status, error and bounds."""
 
     point: int
     realisation: int
@@ -111,15 +111,15 @@ class Outcome:
     status: str  # found, not_found, ambiguous, or failed
     reason: str | None
     error: float | None  # [m]
-    deviation: float | None  # that the estimate claims for itself [m]
+    deviation: float | None  # stated by the estimate [m]
     bound: float | None  # position error bound, the walls known [m]
-    bound_with_walls: float | None  # the walls as their rough echo tells, which bend pilots [m]
-    wall_angle: float | None  # error of the wall that is nearest to the truth's [rad]
+    bound_with_walls: float | None  # with rough walls, estimated from their echo [m]
+    wall_angle: float | None  # error of the detected wall [rad]
     wall_offset: float | None  # likewise [m]
 
     @property
     def located(self) -> float | None:
-        """How far off an answer is that was given; None where there was none. [m]."""
+        """Error of a user with the status found; None otherwise. [m]."""
         return self.error if self.status == "found" else None
 
 
@@ -133,7 +133,7 @@ class SweepJob:
 
     @property
     def space(self) -> SampleSpace:
-        """Its points."""
+        """Sample space of the points."""
         return SampleSpace(self.source, self.config)
 
 
@@ -160,21 +160,20 @@ def plan_sweep(config: Path | Mapping[str, Any], cache: Path) -> SweepJob:
 
 
 def run_sweep(job: SweepJob, *, workers: Workers, tell: Tally | None = None) -> tuple[Outcome, ...]:
-    """Run what is missing of a sweep.
+    """Run the missing points of a sweep.
 
     Parameters
     ----------
     job
-        What to run.
+        The sweep.
     workers
-        Who does it; those of other machines need the same folder and versions.
+        Where points are computed; workers on other machines need the same folder and versions.
     tell
-        Told after each point.
+        Called after each point.
 
     Returns
     -------
-    The outcomes of all points and users, in order. One that has failed is tried again by the next
-    run.
+    The outcomes of all points and users, in order. Failed points are repeated by the next run.
 
     Raises
     ------
@@ -209,12 +208,12 @@ def run_sweep(job: SweepJob, *, workers: Workers, tell: Tally | None = None) -> 
 
 
 def missing_points(job: SweepJob) -> list[int]:
-    """Return the points whose outcome is not kept yet."""
+    """Return the points without a cached outcome."""
     return [point for point, path in enumerate(_outcome_files(job)) if not path.exists()]
 
 
 def run_point(job: SweepJob, point: int) -> None:
-    """Simulate, estimate and compare one point, and keep the outcome; in a worker."""
+    """Simulate, estimate and compare one point, and cache the outcome; in a worker."""
     scenario = _scenario(job, point)
     path = _outcome_file(job, scenario, point)
     seed, sample = job.config.seed, point // job.config.grid_size
@@ -236,15 +235,15 @@ def run_point(job: SweepJob, point: int) -> None:
 
 
 def statistics(errors: Sequence[float | None]) -> tuple[float, float, float]:
-    """Return median, 90 % and worst of errors; one that is not known counts as infinite.
+    """Return median, 90 % and worst of errors; an unknown one counts as infinite.
 
-    A percentile is the smallest error that this share of the cases does not exceed, so that it is
-    finite where that share was found.
+    A percentile is the smallest error not exceeded in that share of the cases, so that it is
+    finite if that share was found.
 
     Parameters
     ----------
     errors
-        None where nothing was found. [m]
+        None: not found. [m]
     """
     values = np.sort([np.inf if error is None else error for error in errors])
     ranks = [int(np.ceil(share * len(values))) - 1 for share in (0.5, 0.9, 1.0)]
@@ -298,7 +297,7 @@ def _compared(
     scenario: Scenario, user: UserEstimate, estimate: Estimate, truth: Truth
 ) -> dict[str, object]:
     walls = [error for error in wall_errors(estimate.mirrors, truth) if error is not None]
-    # The wall that was found is the mirror that covers most of one.
+    # The detected wall is the mirror that covers the largest share of a true one.
     best = max(walls, key=lambda error: error.covered, default=None)
     known, told = position_bounds(scenario, user.name)
     covariance = user.covariance
@@ -316,42 +315,42 @@ def _compared(
 
 
 def position_bounds(scenario: Scenario, user: str) -> tuple[float | None, float | None]:
-    """Return the position error bound with known walls, and with rough ones that are found.
+    """Return the position error bound with known walls, and with walls estimated from their echo.
 
     Parameters
     ----------
     scenario
-        The point's.
+        Of the point.
     user
         Its name.
 
     Returns
     -------
-    Deviations, None where there is no closed form. The second knows each wall as its rough echo
-    tells, and counts what that wall's heights do to the pilot. [m]
+    Standard deviations, None without a closed form. The second includes each wall's covariance from
+    its own rough echo, and the distortion of the pilot by that wall's heights. [m]
     """
     try:
         known = scenario_position_bound(scenario, user).deviation
-    except NoBound:  # no noise, or nothing that fixes the position
+    except NoBound:  # no noise, or the position is not determined
         return None, None
     covariance = {}
     for name, body in scenario.objects.items():
         if isinstance(body, Plate) and body.material != "absorber":
             try:
                 covariance[name] = wall_covariance_bound(scenario, name)
-            except NoBound:  # smooth, or in space: its echo has no such closed form
+            except NoBound:  # a smooth wall, or 3-D: no closed form
                 return known, None
     try:
         told = scenario_position_bound(scenario, user, wall_covariance=covariance).deviation
         return known, float(np.hypot(told, _bent(scenario, user)))
-    except NoBound:  # the walls are too uncertain, or the scene in space
+    except NoBound:  # the walls are too uncertain, or the scene is 3-D
         return known, None
 
 
 def _bent(scenario: Scenario, user: str) -> float:
-    """Return what a wall's heights do to the pilot itself, if it comes over that one alone [m].
+    """Return the position error by a wall's heights in the pilot, if over that wall alone [m].
 
-    Beside a direct path, or over several walls, there is no closed form; then it is 0.
+    With a direct path in addition, or over several walls, there is no closed form; then it is 0.
     """
     heard = user_waves(scenario, user)
     if len(heard.paths) != 1 or len(heard.paths[0]) != 1:

@@ -19,7 +19,7 @@ COLUMNS = {
     "wall_angle": "wall_angle_rad",
     "wall_offset": "wall_offset_m",
 }
-"""Numbers of an outcome, and their names with units."""
+"""Quantities of an outcome, and their column names with units."""
 
 _MEANINGS = {
     "error": "distance of the estimate from the true position",
@@ -39,7 +39,7 @@ def error_table(outcomes: Sequence[Outcome], space: SampleSpace) -> str:
     outcomes
         Of the sweep.
     space
-        Of its points; says what varies.
+        Of its points; gives the varied keys.
     """
     keys = [one.key for one in space.parameters]
     text = io.StringIO(newline="")
@@ -54,7 +54,7 @@ def error_table(outcomes: Sequence[Outcome], space: SampleSpace) -> str:
 
 
 def error_dataset(outcomes: Sequence[Outcome], config: SweepConfig) -> xr.Dataset:
-    """Lay outcomes out over the axes of the grid, the realisations and the users.
+    """Arrange outcomes over the axes of the grid, the realisations and the users.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def error_dataset(outcomes: Sequence[Outcome], config: SweepConfig) -> xr.Datase
 
     Returns
     -------
-    A variable for each of :data:`COLUMNS`, and ``status``; NaN and "" where a user does not
-    exist. The grid's axes are named by their (first) key.
+    A variable for each of :data:`COLUMNS`, and ``status``; NaN and "" for absent users. The grid's
+    axes are named by their (first) key.
     """
     users = list(dict.fromkeys(one.user for one in outcomes))
     axes = config.grid

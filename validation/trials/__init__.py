@@ -1,4 +1,4 @@
-"""Rooms drawn at random, hidden users and targets, and rooms that invite wrong answers.
+"""Drawn echoes, hidden users and targets, and rooms prone to wrong answers.
 
 Shared by experiments and claims.
 """

@@ -1,7 +1,7 @@
-"""What chance alone makes of noise, speckle and strewn peaks, beside the estimator's thresholds.
+"""False alarms by noise, speckle and random peaks, compared with the estimator's thresholds.
 
-Each function draws what a threshold is to refuse, or to pass, and returns rows whose limit is what
-the threshold's docstring says of it.
+Each function draws data that a threshold should reject, or accept, and returns rows with the limits
+stated in the threshold's docstring.
 """
 
 import numpy as np
@@ -19,11 +19,11 @@ from validation.harness.claim import Row
 from validation.trials.drawn_echoes import draw_echo
 
 SURE = 1e-3
-"""Probability that a measured share falls outside of limits that hold. [-]"""
+"""Probability that a measured share is outside of correct limits. [-]"""
 
 
 def share_limits(probability: float, trials: int) -> tuple[float, float]:
-    """Return between which shares an event of a probability stays in so many trials. [-]."""
+    """Return limits of the share of events of a probability in a number of trials. [-]."""
     low = binom.ppf(SURE / 2, trials, probability) / trials
     return float(low), float(binom.ppf(1 - SURE / 2, trials, probability) / trials)
 
@@ -31,8 +31,7 @@ def share_limits(probability: float, trials: int) -> tuple[float, float]:
 def highest_of_cells(rng: np.random.Generator, *, trials: int = 4000, cells: int = 2000) -> Row:
     """Measure how often the brightest of many cells of noise passes the threshold of a rate.
 
-    The law is checked at a rate of 0.05, which can be measured; the estimator's own rates are too
-    small for that.
+    It is checked at a rate of 0.05; the estimator's own rates are too small to be measured.
     """
     rate = 0.05
     highest = rng.exponential(size=(trials, cells)).max(axis=1)
@@ -61,7 +60,7 @@ def peaks_of_noise(rng: np.random.Generator, *, images: int = 20) -> Row:
 
 
 def strewn_lines(rng: np.random.Generator, *, peaks: int, images: int = 10) -> Row:
-    """Count the line candidates among peaks strewn evenly over an image."""
+    """Count the line candidates among peaks uniformly random in an image."""
     looked = survey(draw_echo("noise", rng).echo)
     coarse = coarse_resolution(echo_resolution(draw_echo("noise", rng).echo))
     places = looked.points.reshape(-1, 3)
@@ -80,7 +79,7 @@ def strewn_lines(rng: np.random.Generator, *, peaks: int, images: int = 10) -> R
 
 
 def strewn_planes(rng: np.random.Generator, *, peaks: int = 300, volumes: int = 100) -> Row:
-    """Count how often peaks strewn evenly over a volume make a plane."""
+    """Count how often peaks uniformly random in a volume make a plane."""
     resolution = coarse_resolution(PLANAR_RESOLUTION)
     depth, width = 3.0, 1.2
     found = 0
@@ -99,14 +98,14 @@ def strewn_planes(rng: np.random.Generator, *, peaks: int = 300, volumes: int = 
 
 
 PLANAR_RESOLUTION = Resolution(along_ray=0.0214, across_ray=0.016)
-"""Of 32 × 32 elements of 5 mm at 57 to 64 GHz, as in ``room_3d``."""
+"""Resolution of 32 × 32 elements of 5 mm at 57 to 64 GHz, as in ``room_3d``."""
 
 
 def speckle_gap(rng: np.random.Generator, *, cells: int = 100_000) -> tuple[Row, Row]:
-    """Measure how far apart the peaks of speckle along a wall are.
+    """Measure the distances between peaks of speckle along a wall.
 
-    Speckle is Gaussian noise limited to one cycle a cell, sampled eight times a cell; its peaks
-    are those above a tenth of the mean within half a cell to either side.
+    Speckle is Gaussian noise with a bandwidth of one cycle per cell, sampled eight times per cell;
+    peaks are maxima within half a cell to either side, above a tenth of the mean.
     """
     per_cell = 8
     kernel = firwin(16 * per_cell + 1, 1.0 / per_cell)
@@ -140,7 +139,7 @@ def speckle_gap(rng: np.random.Generator, *, cells: int = 100_000) -> tuple[Row,
 
 
 def speckle_levels(rng: np.random.Generator, *, cells: int = 200_000) -> tuple[Row, Row]:
-    """Measure how often speckle is dark, and how its mean over a few cells scatters in decibels."""
+    """Measure how often speckle is dark, and the deviation of its mean over some cells in dB."""
     intensity = rng.exponential(size=cells)
     count = int(line_extent.CELLS_OF_STEP)
     means = (10 * np.log10(intensity[: cells // count * count])).reshape(-1, count).mean(axis=1)
@@ -166,9 +165,9 @@ def speckle_levels(rng: np.random.Generator, *, cells: int = 200_000) -> tuple[R
 
 
 def smoothed_background(rng: np.random.Generator, *, pixels: int = 1000) -> Row:
-    """Measure how often background, averaged over nine half-cell pixels, passes the contrast."""
+    """Measure how often background, averaged over nine half-cell pixels, exceeds the contrast."""
     fine: Float[np.ndarray, "2 rows columns"] = rng.standard_normal((2, pixels, pixels))
-    # Pixels of half a cell: the band is half of what they can hold, along each axis.
+    # Pixels of half a cell: the band is half of the sampling rate along each axis.
     spectrum = np.fft.fft2(fine[0] + 1j * fine[1])
     inside = np.abs(np.fft.fftfreq(pixels)) < 0.25
     intensity = np.abs(np.fft.ifft2(spectrum * np.outer(inside, inside))) ** 2
@@ -183,7 +182,7 @@ def smoothed_background(rng: np.random.Generator, *, pixels: int = 1000) -> Row:
 
 
 def chance_rows(rng: np.random.Generator, *, share: float = 1.0) -> list[Row]:
-    """Measure all of these, with a share of their usual draws."""
+    """Return the rows of all functions, with a share of their usual numbers of draws."""
     return [
         highest_of_cells(rng, trials=max(400, round(4000 * share))),
         peaks_of_noise(rng, images=max(2, round(20 * share))),

@@ -1,10 +1,9 @@
-"""Echoes of rough walls and posts drawn at random, in closed form: no simulator, no estimator.
+"""Echoes of random rough walls and posts in closed form, independent of simulator and estimator.
 
-A rough wall is a row of points of random strength and phase, several for each resolution cell,
-which is what makes speckle; posts are single points. Scatterers do not see each other, so nothing
-here is scattered twice: what only such echoes hold (ghosts, clouds) needs the simulator
-(:mod:`validation.trials.trap_rooms`). The array is half the library's: 128 elements of 0.5 mm,
-220 to 295 GHz, 501 frequencies (unambiguous to 1 m).
+A rough wall is a row of points of random amplitude and phase, several per resolution cell, which
+gives speckle; posts are single points. There is no multiple scattering: ghosts and diffuse clouds
+need the simulator (:mod:`validation.trials.trap_rooms`). The array is half the library's: 128
+elements of 0.5 mm, 220 to 295 GHz, 501 frequencies (unambiguous to 1 m).
 """
 
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ SPACING = 0.5e-3  # [m]
 POINTS_PER_CELL = 2
 """Points of a wall for each c/2B along it. [-]"""
 SNR_DB = 20.0
-"""Of a sample of the echo, as in the library. [dB]"""
+"""Signal-to-noise ratio of a sample of the echo, as in the library. [dB]"""
 
 Kind = Literal["wall", "corner", "posts", "noise"]
 KINDS: tuple[Kind, ...] = ("wall", "corner", "posts", "noise")
@@ -33,7 +32,7 @@ Segment = tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnEcho:
-    """An echo and the walls that it is of."""
+    """An echo and its true walls."""
 
     kind: Kind
     echo: Echo
@@ -54,10 +53,10 @@ def draw_echo(kind: Kind, rng: np.random.Generator) -> DrawnEcho:
     ----------
     kind
         ``wall``: one wall 12 to 25 cm long, 0.3 to 0.6 m away within 20° of boresight, turned by
-        up to 60°; ``corner``: another one, 12 cm long, joins it at one end at 60° to 120°, both in
-        sight; ``posts``: six posts anywhere in that region; ``noise``: nothing.
+        up to 60°; ``corner``: a second one, 12 cm long, joins it at one end at 60° to 120°, both
+        in line of sight; ``posts``: six posts anywhere in that region; ``noise``: noise only.
     rng
-        Source of all that is random.
+        Source of all random numbers.
     """
     walls: list[Segment] = []
     points = np.zeros((0, 3))
@@ -96,7 +95,7 @@ def _draw_wall(rng: np.random.Generator) -> Segment:
 
 
 def _joined(wall: Segment, rng: np.random.Generator) -> Segment:
-    """Draw a wall that begins where another ends, neither before the other."""
+    """Draw a wall that begins at the end of another, with neither in front of the other."""
     along = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
     while True:
         turn = rng.choice([-1, 1]) * np.radians(rng.uniform(60, 120))
@@ -114,7 +113,7 @@ def _joined(wall: Segment, rng: np.random.Generator) -> Segment:
 
 
 def _shares_directions(wall: Segment, other: Segment) -> bool:
-    """Tell whether two walls that meet lie partly in the same directions from the origin."""
+    """Return whether two adjoining walls overlap in direction from the origin."""
     (low, high), (first, last) = (
         sorted(float(end[0] / end[1]) for end in one) for one in (wall, other)
     )

@@ -1,4 +1,4 @@
-"""Imaging what is seen only over a wall: the mirror, and targets unfolded to where they are."""
+"""Imaging of hidden targets over a wall: the mirror, and the targets' unfolded positions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,36 +27,37 @@ from validation.metrics.target_association import compare_targets
 from validation.metrics.truth import Truth, front_face, truth_from_dataset
 
 RANGE_LIMIT = 1.5e-3
-"""Of an unfolded front face along its line of sight: the null-to-peak range cell c/2B of 100 GHz,
-which is what the thesis calls its range resolution. [m]"""
+"""Largest error of an unfolded front face along its line of sight: the null-to-peak range cell c/2B
+of 100 GHz, the thesis' range resolution. [m]"""
 FALSE_DB = -10.0
-"""A target that is none counts from here on, over the weakest true one: what an eye would take for
-a third object in a figure. [dB]"""
+"""Least level of a counted false target, relative to the weakest true one: brighter ones look like
+another object in a figure. [dB]"""
 ANGLE_LIMIT = np.degrees(1e-3 / 2 / 0.6)
-"""Of the mirror: it moves what stands 0.6 m behind it by 1 mm. [°]"""
+"""Largest error of the mirror's angle: it moves a target 0.6 m behind it by 1 mm. [°]"""
 OFFSET_LIMIT = 0.5e-3
-"""Of the mirror: it moves an unfolded target by √2 as much along its line of sight at 45°, half of
-:data:`RANGE_LIMIT`. [m]"""
+"""Largest error of the mirror's offset: at 45° it moves an unfolded target by √2 as much along its
+line of sight, half of :data:`RANGE_LIMIT`. [m]"""
 PEAK_WITHIN = 8e-3
-"""Where the corrected image's peak is looked for around a true front face: two cells. [m]"""
+"""Radius around a true front face in which the corrected image's peak is searched: two cells.
+[m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HiddenTarget:
-    """One hidden object: where it was found, beside where its front face is."""
+    """One hidden object: errors of its position against its true front face."""
 
     name: str
-    range_error: float  # along the last leg of the way from the array, + too far [m]
+    range_error: float  # along the last leg of the path from the array, + too far [m]
     across_error: float  # across that, unsigned [m]
-    ghost_error: float  # of where the raw image shows it, from its mirror image [m]
-    image_range_error: float  # of the corrected image's brightest pixel there, like the first [m]
+    ghost_error: float  # of the ghost in the raw image, from the true mirror image [m]
+    image_range_error: float  # range error of the corrected image's brightest pixel there [m]
     cell_across: float  # -3 dB, at the ghost [m]
     level_db: float  # over an ideal unit point's [dB]
 
 
 @dataclass(frozen=True, kw_only=True)
 class HiddenImaging:
-    """What one realisation gave."""
+    """Result of one realisation."""
 
     scenario: Scenario
     seed: int
@@ -70,16 +71,16 @@ class HiddenImaging:
 
     @property
     def false(self) -> int:
-        """False targets that an eye would take for true ones."""
+        """Number of false targets above :data:`FALSE_DB`."""
         return sum(level > FALSE_DB for level in self.false_levels_db)
 
 
 @runtime_checkable
 class MeasureSeed(Protocol):
-    """Simulates and images one realisation."""
+    """Function that simulates and images one realisation."""
 
     def __call__(self, *, seed: int) -> HiddenImaging:
-        """Do so for a seed."""
+        """Simulate and image the realisation of a seed."""
 
 
 def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging:
@@ -88,7 +89,7 @@ def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging
     Parameters
     ----------
     scenario
-        With one wall, and targets that are seen only over it.
+        With one wall, and targets that are visible only over it.
     seed
         Of roughness and noise.
     wall
@@ -97,7 +98,7 @@ def measure_hidden(scenario: Scenario, *, seed: int, wall: str) -> HiddenImaging
     Raises
     ------
     RuntimeError
-        If no mirror at all is found.
+        If no mirror is found.
     """
     simulation = simulate(scenario, seed=seed)
     truth = truth_from_dataset(simulation.truth)
@@ -177,7 +178,7 @@ def conclude_hidden(arguments: Sequence[str], name: str, measure: MeasureSeed) -
     name
         Of the experiment; the file's default.
     measure
-        Simulates and images a realisation by its seed.
+        Function that simulates and images a realisation by its seed.
     """
     path = Path(arguments[0] if arguments else f"{name}.png")
     seeds = int(arguments[1]) if len(arguments) > 1 else 1
@@ -188,7 +189,7 @@ def conclude_hidden(arguments: Sequence[str], name: str, measure: MeasureSeed) -
 
 
 def hidden_rows(results: Sequence[HiddenImaging]) -> tuple[Row, ...]:
-    """State the worst of several realisations beside the claims."""
+    """Return rows of the largest errors of several realisations."""
     targets = [target for one in results for target in one.targets]
     seeds = f"worst of {len(results)}" if len(results) > 1 else "one realisation"
     pixel = max(one.pixel for one in results)
@@ -282,9 +283,9 @@ def _silhouette(scenario: Scenario, name: str) -> Float[np.ndarray, "corners 3"]
 
 
 def draw_hidden(figure: Figure, result: HiddenImaging) -> None:
-    """Draw the raw image with its ghosts, and the corrected one with all that was found.
+    """Draw the raw image with its ghosts, and the corrected one with mirror and targets.
 
-    What is known to be true is drawn in white: dotted where the raw image should show ghosts.
+    The truth is drawn in white; the true places of ghosts in the raw image are dotted.
     """
     raw, corrected = result.estimate.raw_image, result.estimate.corrected_image
     if raw is None or corrected is None:

@@ -1,4 +1,4 @@
-"""Locating a user that is seen only over walls: each realisation beside the truth."""
+"""Localization of a user over walls only (NLoS): realisations compared with the truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,8 +24,8 @@ from validation.metrics.point_response import PeakCut, peak_cut
 from validation.metrics.truth import Truth, truth_from_dataset
 
 WIDTHS_WITHIN = 0.05
-"""Of -3 dB widths: theory is that of a narrow band and an untapered aperture, and a rough wall
-bends the wave a little. [-]"""
+"""Largest relative error of -3 dB widths: theory is for a narrow band and an untapered aperture,
+and a rough wall distorts the wavefront slightly. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class MapCuts:
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """What the figures show of a realisation."""
+    """Data of a realisation for the figures."""
 
     measurement: Measurement
     estimate: Estimate
@@ -53,17 +53,17 @@ class Seen:
 
 @dataclass(frozen=True, kw_only=True)
 class UserTrial:
-    """One realisation, beside the truth."""
+    """One realisation compared with the truth."""
 
     seed: int
     status: str
     error: float | None  # of the user's position [m]
     true_aoa: float  # of its image in the walls [rad]
     true_length: float  # [m]
-    aoa_error: float  # signed; NaN without an answer [rad]
+    aoa_error: float  # signed; NaN without a position [rad]
     length_error: float  # signed [m]
-    walls: tuple[WallError | None, ...]  # of each wall on the way, unfolded; None: not found
-    ghosts: tuple[WallError | None, ...]  # the same where the raw image shows them
+    walls: tuple[WallError | None, ...]  # of each wall of the path, unfolded; None: not found
+    ghosts: tuple[WallError | None, ...]  # the same at their places in the raw image
     cuts: MapCuts
     seen: Seen | None
 
@@ -74,7 +74,7 @@ class UserTrial:
 
     @property
     def theory_across(self) -> float:
-        """Theory's width across. [m]."""
+        """Theoretical width across range. [m]."""
         return self.cuts.theory_angle * self.true_length
 
 
@@ -84,11 +84,11 @@ def hidden_user(scenario: Scenario, *, seed: int, walls: Sequence[str]) -> UserT
     Parameters
     ----------
     scenario
-        Its array is centred at the origin, along +x.
+        With the array centred at the origin, along +x.
     seed
         Of roughness and noise.
     walls
-        Names of those on the user's way, from the array outward.
+        Names of those of the user's path, from the array outward.
     """
     simulation = simulate(scenario, seed=seed)
     truth = truth_from_dataset(simulation.truth)
@@ -129,7 +129,7 @@ def compare_user(
 
 
 def _mirror_on(name: str, estimate: Estimate, truth: Truth) -> Mirror | None:
-    """Return the most confident mirror that lies nearest to a true wall."""
+    """Return the most confident mirror whose nearest true wall is the given one."""
     on_it = [one for one in estimate.mirrors if nearest_wall(one, truth) == name]
     return max(on_it, key=lambda one: one.confidence, default=None)
 
@@ -142,7 +142,7 @@ def _wall(name: str, estimate: Estimate, truth: Truth) -> WallError | None:
 
 
 def _ghost(index: int, walls: Sequence[str], estimate: Estimate, truth: Truth) -> WallError | None:
-    """Compare a wall where the raw image shows it: mirrored in those that it is seen through."""
+    """Compare a wall at its place in the raw image: mirrored in the walls before it."""
     mirror = _mirror_on(walls[index], estimate, truth)
     if mirror is None:
         return None
@@ -165,11 +165,11 @@ def map_cuts(uplink: Uplink, *, aoa: float, path_length: float) -> MapCuts:
     uplink
         Of an array centred at the origin, along +x.
     aoa, path_length
-        Where the peak is, up to a part of its width. [rad], [m]
+        Of the peak, approximately (to a part of its width). [rad], [m]
     """
     frequencies = uplink.frequencies
     elements = len(uplink.positions)
-    # Each element stands for one spacing.
+    # Each element represents one spacing.
     aperture = float(np.ptp(uplink.positions[:, 0])) * elements / (elements - 1)
     width = angular_resolution(
         wavelength=2 * speed_of_light / float(frequencies[0] + frequencies[-1]),
@@ -198,7 +198,7 @@ def map_cuts(uplink: Uplink, *, aoa: float, path_length: float) -> MapCuts:
 def user_rows(
     trials: Sequence[UserTrial], *, median: float, worst: float, thesis: str, across: str
 ) -> tuple[Row, ...]:
-    """State the errors of several realisations, and the widths of the map.
+    """Return rows of the errors of several realisations, and of the widths of the map.
 
     Parameters
     ----------
@@ -207,9 +207,9 @@ def user_rows(
     median, worst
         Largest errors claimed. [m]
     thesis
-        What it says of the error.
+        Error stated in the thesis.
     across
-        What it says of the cross-range width.
+        Cross-range width stated in the thesis.
     """
     summary = error_summary([trial.error for trial in trials])
     count = f"{len(trials)} realisations" if len(trials) > 1 else "one realisation"
@@ -265,7 +265,7 @@ def wall_rows(
     origin: str,
     as_seen: bool = False,
 ) -> tuple[Row, ...]:
-    """State the worst error of one wall on the way.
+    """Return rows of the largest errors of one wall of the path.
 
     Parameters
     ----------
@@ -276,9 +276,9 @@ def wall_rows(
     angle, offset
         Largest errors claimed. [rad], [m]
     origin
-        Of these.
+        Of these limits.
     as_seen
-        Where the raw image shows it, instead of where it is.
+        Whether the wall's place in the raw image is compared, not the unfolded one.
     """
     found = [(trial.ghosts if as_seen else trial.walls)[index] for trial in trials]
     known = [one for one in found if one is not None]
@@ -311,7 +311,7 @@ def wall_rows(
 
 
 def draw_map(ax: Axes, trial: UserTrial) -> None:
-    """Draw the enlarged angle/range map with the -3 dB widths that were measured."""
+    """Draw the enlarged angle/range map with the measured -3 dB widths."""
     seen = _seen(trial)
     (heard,), (user,) = seen.estimate.close_ups, seen.estimate.users
     figures_2d.draw_angle_range_map(ax, heard, user, peak=float(np.abs(heard.values).max()))
@@ -331,7 +331,7 @@ def draw_map(ax: Axes, trial: UserTrial) -> None:
 
 
 def draw_plan(ax: Axes, trial: UserTrial) -> None:
-    """Draw what was found in plan, over the true walls and user."""
+    """Draw the estimate in plan, over the true walls and user."""
     seen = _seen(trial)
     walls = [
         np.stack([start, seen.truth.wall_end[name]])
@@ -351,7 +351,7 @@ def draw_plan(ax: Axes, trial: UserTrial) -> None:
 
 
 def draw_errors(ax: Axes, trials: Sequence[UserTrial], *, limit: float) -> None:
-    """Draw the share of realisations over the error, beside a claimed limit. [m]."""
+    """Draw the distribution of errors over realisations, with a claimed limit. [m]."""
     summary = error_summary([trial.error for trial in trials])
     errors = 1e3 * summary.errors
     shares = np.arange(1, len(errors) + 1) / summary.trials
@@ -368,7 +368,7 @@ def draw_errors(ax: Axes, trials: Sequence[UserTrial], *, limit: float) -> None:
 
 
 def first_user(trial: UserTrial) -> UserEstimate:
-    """Return the user as it was estimated."""
+    """Return the first user of the estimate."""
     return _seen(trial).estimate.users[0]
 
 

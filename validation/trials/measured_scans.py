@@ -1,7 +1,7 @@
-"""Scans of things that are no rooms, drawn in closed form: points, letters, soil, offsets.
+"""Scans of scenes without walls, drawn in closed form: points, letters, soil, offsets.
 
-None has a wall. What :func:`estimator.localization.pipeline.locate` says of them is held against
-the draw: a mirror that is certain is false, and so is a target far from anything.
+For the estimates by :func:`estimator.localization.pipeline.locate`, a mirror of high confidence is
+false, and so is a target far from all scatterers.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ STROKE = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnScan:
-    """A scan and what it is of."""
+    """A scan and its scatterers."""
 
     kind: ScanKind
     planar: bool
@@ -48,9 +48,9 @@ def facing_echo(
     positions: Float[np.ndarray, "positions 3"],
     frequencies: Float[np.ndarray, " freqs"],
 ) -> Complex[np.ndarray, "positions freqs"]:
-    r"""Sum the pieces of a surface that faces −y: :math:`\sum a \cos\theta\, e^{-2jkr} / r^2`.
+    r"""Sum the elements of a surface that faces −y: :math:`\sum a \cos\theta\, e^{-2jkr} / r^2`.
 
-    Frequencies must be uniform: each follows from the one before by a factor for each piece.
+    Frequencies must be uniform: phases advance by a constant factor for each element.
     """
     samples = np.zeros((len(positions), frequencies.size), dtype=np.complex128)
     step = 4 * np.pi * float(frequencies[1] - frequencies[0]) / speed_of_light
@@ -67,15 +67,15 @@ def facing_echo(
 
 
 def drawn_scan(kind: ScanKind, rng: np.random.Generator, *, planar: bool) -> DrawnScan:
-    """Draw a scan: its band, aperture, distance, things and noise of 20 to 40 dB.
+    """Draw a scan: band, aperture, distance, scatterers, and an SNR of 20 to 40 dB.
 
     Parameters
     ----------
     kind
-        What is scanned. ``soil``: 600 scatterers strewn over a volume; ``multiples``: points, and
-        a repetition of each at twice the distance.
+        Kind of scene. ``soil``: 600 scatterers uniform in a volume; ``multiples``: points, and a
+        repetition of each at twice the distance.
     rng
-        Of all that is drawn.
+        Source of all random numbers.
     planar
         Whether positions lie on a square or on a line.
     """

@@ -1,8 +1,8 @@
-"""Rooms that invite a confident wrong answer; :mod:`validation.experiments.traps` tries them.
+"""Rooms prone to confidently wrong answers, used by :mod:`validation.experiments.traps`.
 
-Each is a built-in scenario and what is changed of it. Scenes of half the library's size keep a
-trial short: 128 elements, 251 frequencies (501 where something stands farther away than 0.5 m of
-echo or 1 m of path are unambiguous), walls 0.4 m away.
+Each is a built-in scenario with overrides. Half of the library's size keeps trials short: 128
+elements, 251 frequencies (501 if objects or paths exceed the unambiguous 0.5 m of echo range or 1 m
+of path), walls 0.4 m away.
 """
 
 HALF_SIZE = (
@@ -14,7 +14,7 @@ HALF_SIZE = (
 FARTHER = (*HALF_SIZE, "radio.points=501")
 COARSER = ("objects.wall.roughness.rms_mm=0.1", "objects.wall.roughness.correlation_mm=0.6")
 FACING = (*FARTHER, *COARSER)
-"""Where walls see each other: coarser facets, whose pairs are a quarter as many."""
+"""Overrides if walls see each other: coarser facets, with a quarter of the pairs."""
 
 
 def plate(
@@ -72,7 +72,7 @@ def user(x: float, y: float, aim: str | None = None) -> tuple[str, ...]:
 
 
 BEAM, OPEN = "slam_2d", "los_user"
-"""The user of the first sends a narrow beam, that of the second sends everywhere."""
+"""Scenarios whose user has a narrow beam, and an isotropic antenna."""
 
 TRAPS: dict[str, tuple[str, tuple[str, ...]]] = {
     "plain": (BEAM, (*HALF_SIZE, *user(0.45, 0.4))),

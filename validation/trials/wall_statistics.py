@@ -1,9 +1,9 @@
-"""What rough walls drawn at random show in their own echo, beside the thresholds of wall detection.
+"""Statistics of the echoes of random rough walls, compared with thresholds of wall detection.
 
-The walls are those of :mod:`validation.trials.drawn_echoes`, whose true lines are known. Two kinds
-of figures: statistics that thresholds bound (how far from a wall its peaks lie, how coherent they
-are, how much of the echo its row explains), and what detection gives as one threshold is changed,
-all others kept.
+The walls are those of :mod:`validation.trials.drawn_echoes`, whose true lines are known. Measured
+are the statistics that thresholds bound (distances of peaks from the wall, their coherence, the
+share of the echo explained by the wall's row), and the result of detection if one threshold is
+changed and all others are kept.
 """
 
 import sys
@@ -35,38 +35,38 @@ from validation.trials.drawn_echoes import DrawnEcho, Kind, Segment, draw_echo
 from validation.trials.trap_rooms import FARTHER
 
 NEAR = 6.0
-"""Cells about a true wall within which peaks are counted as its own. [cells]"""
+"""Distance from a true wall within which peaks are attributed to it. [cells]"""
 SAME_ANGLE = np.radians(2.0)
-"""Angle between a line that was found and the true wall that it is. [rad]"""
+"""Largest angle between a detected line and the true wall that it represents. [rad]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WallStatistics:
-    """What one wall's echo shows; NaN where it was not found."""
+    """Statistics of one wall's echo; NaN if the wall was not detected."""
 
-    beside: float  # 99 % of its peaks lie nearer to its line [cells]
-    beyond_end: float  # the farthest peak beyond an end of the line found [cells]
+    beside: float  # distance from the line within which 99 % of its peaks are [cells]
+    beyond_end: float  # of the farthest peak beyond an end of the detected line [cells]
     bent: float  # share of its peaks with an excess curvature [-]
     coherence: float  # median of its peaks [-]
-    contrast: float  # level over background of the line found [-]
-    deviation: float  # stated, of its offset and its ends, the larger [cells]
+    contrast: float  # level over background of the detected line [-]
+    deviation: float  # stated, of its offset or its ends, the larger [cells]
     explained: float  # share of the echo that the row of scatterers explains [-]
-    disagreement: float  # of the image's line and the echo's, squared, over both covariances [-]
-    turn: float  # of the line found from the true one [rad]
-    tilt_share: float  # its square, over the variance that the line's speckle lets expect [-]
+    disagreement: float  # between the fits to image and echo, normalised square [-]
+    turn: float  # angle between detected and true line [rad]
+    tilt_share: float  # its square over the variance expected from speckle [-]
     offset_share: float  # the same of its offset [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Surveyed:
-    """An echo that was drawn, with its survey."""
+    """A drawn echo with its survey."""
 
     drawn: DrawnEcho
     looked: Survey
 
 
 def surveyed(kinds: Sequence[Kind], seed: int) -> tuple[Surveyed, ...]:
-    """Draw and survey one echo of each kind in a list."""
+    """Draw and survey an echo for each kind in a list."""
     echoes = [
         draw_echo(kind, np.random.default_rng([seed, index])) for index, kind in enumerate(kinds)
     ]
@@ -87,8 +87,8 @@ WALLS: dict[str, tuple[str, ...]] = {
         "objects.wall.roughness.rms_mm=0.02",
     ),
 }
-"""What is changed of the wall of :data:`validation.trials.trap_rooms.FARTHER`, all of which lies
-within the unambiguous range: what is cut off there is not explained by the wall's row."""
+"""Overrides of the wall of :data:`validation.trials.trap_rooms.FARTHER`. All of it is within the
+unambiguous range: a part beyond would not be explained by the wall's row."""
 
 
 def simulated_wall(overrides: Sequence[str], seed: int) -> Surveyed:
@@ -101,7 +101,7 @@ def simulated_wall(overrides: Sequence[str], seed: int) -> Surveyed:
 
 
 def wall_statistics(one: Surveyed) -> WallStatistics:
-    """Measure what the single wall of an echo shows."""
+    """Measure the statistics of the single wall of an echo."""
     (wall,) = one.drawn.walls
     echo, looked = one.drawn.echo, one.looked
     fine = echo_resolution(echo)
@@ -161,16 +161,16 @@ def wall_statistics(one: Surveyed) -> WallStatistics:
 
 @dataclass(frozen=True, kw_only=True)
 class Detection:
-    """What detection gave of several echoes."""
+    """Result of detection on several echoes."""
 
     walls: int  # true ones
     found: int  # of them
-    false: int  # lines that are none
-    median_turn: float  # of those found [rad]
+    false: int  # lines that are not walls
+    median_turn: float  # error of angle of those found [rad]
 
 
 def detection(echoes: Sequence[Surveyed]) -> Detection:
-    """Detect the walls of echoes, place them by the whole echo, and compare with the truth."""
+    """Detect the walls of echoes, refine them by the whole echo, and compare with the truth."""
     turns: list[float] = []
     false = 0
     for one in echoes:
@@ -194,16 +194,16 @@ def detection(echoes: Sequence[Surveyed]) -> Detection:
 
 @contextmanager
 def changed(module: str, name: str, value: object) -> Iterator[None]:
-    """Give a constant of the estimator another value, in every module that has its name.
+    """Temporarily change a constant of the estimator, in every module that imports it.
 
     Parameters
     ----------
     module
-        That defines it, such as ``estimator.walls.line_relations``.
+        Module that defines it, such as ``estimator.walls.line_relations``.
     name
         Of the constant.
     value
-        Meanwhile.
+        Temporary value.
     """
     before = getattr(sys.modules[module], name)
     holders = [
@@ -221,7 +221,7 @@ def changed(module: str, name: str, value: object) -> Iterator[None]:
 
 
 def crossing_overlap(rng: np.random.Generator, *, draws: int = 400) -> Float[np.ndarray, " draws"]:
-    """Measure which share of a wall lies on another one that crosses it at 30° to 90°. [-]."""
+    """Measure the share of a wall that lies on another one crossing it at 30° to 90°. [-]."""
     coarse = coarse_resolution(echo_resolution(draw_echo("noise", rng).echo))
     shares = []
     for _ in range(draws):
@@ -242,11 +242,11 @@ def crossing_overlap(rng: np.random.Generator, *, draws: int = 400) -> Float[np.
 
 
 def followed_overlap(one: Surveyed) -> float:
-    """Fit a wall from either half, and measure which share of one line lies on the other.
+    """Fit a wall from either half, and measure the share of one line that lies on the other.
 
     Returns
     -------
-    The smaller share of both; NaN where a half gives no line. [-]
+    The smaller share of both; NaN if a half gives no line. [-]
     """
     (wall,) = one.drawn.walls
     echo, coarse = one.drawn.echo, coarse_resolution(echo_resolution(one.drawn.echo))
@@ -295,13 +295,13 @@ def _exact(start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]) -> Fitt
 
 
 def _turn(wall: Segment, line: FittedLine) -> float:
-    """Return the angle between a line and a wall, without a sign. [rad]."""
+    """Return the unsigned angle between a line and a wall. [rad]."""
     along = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
     return float(np.arcsin(min(1.0, abs(float(np.cross(along, line.direction)[2])))))
 
 
 def _match(wall: Segment, lines: Sequence[FittedLine]) -> FittedLine | None:
-    """Return the line that is a wall: on it with its middle, and as long at least as half of it."""
+    """Return the line that represents a wall: middle on it, at least half as long; else None."""
     length = float(np.linalg.norm(wall[1] - wall[0]))
     along, normal = (wall[1] - wall[0]) / length, unit_normal(*wall)
     for line in sorted(lines, key=lambda one: -one.length):

@@ -1,4 +1,4 @@
-r"""How exact the full-wave solver is for both polarisations, dielectrics and edges.
+r"""Accuracy of the full-wave solver for both polarisations, dielectrics and edges.
 
 Run as ``python -m validation.experiments.full_wave.bodies``; it takes half a minute.
 
@@ -9,12 +9,13 @@ asserted, each for TM and TE:
 - A cylinder of two wavelengths' radius, of a conductor, of plasterboard at 250 GHz
   (:math:`\varepsilon = 2.56 - 0.13j`), and of a lossless dielectric, scatters as its series says,
   to 1e-7.
-- A slab of plasterboard, 34 wavelengths wide and 1.3 thick, reflects a beam at 35° and lets it
-  through as Airy's formula says, to 1e-4 of the incident field: at its ends the beam is down to
-  2e-4.
-- The edge of a half plane, and of a right wedge, diffract as their series say: TM to 1e-4, the
-  error of the grid at the wedge's corner; TE to 1.2e-2, since in TE waves run along the faces, 40
-  wavelengths long, and back from their ends.
+- The reflection and transmission of a beam at 35° by a slab of plasterboard, 34 wavelengths wide
+and
+  1.3 thick, agree with Airy's formula to 1e-4 of the incident field; at the slab's ends the beam is
+  down to 2e-4.
+- The diffraction by the edges of a half plane and of a wedge of 90° agrees with their series: in TM
+  to 1e-4, the error of the grid at the wedge's corner; in TE to 1.2e-2, since TE waves travel along
+  the faces, 40 wavelengths long, and are reflected at their ends.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ FACE = 40.0
 
 @dataclass(frozen=True, kw_only=True)
 class BodyError:
-    """How far one body's field is off its closed form."""
+    """Error of one body's field against its closed form."""
 
     name: str
     error: float  # relative [-]
@@ -147,7 +148,7 @@ def _edge_error(polarisation: Polarisation, *, right: bool) -> float:
 
 
 def check(errors: tuple[BodyError, ...]) -> None:
-    """Fail if one is too large.
+    """Raise if an error is too large.
 
     Raises
     ------

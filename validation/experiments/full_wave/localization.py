@@ -1,19 +1,19 @@
-r"""The estimator on full-wave data, end to end: where the user of ``slam_2d`` is found.
+r"""The estimator on full-wave data, end to end: position errors of the user of ``slam_2d``.
 
 Run as ``python -m validation.experiments.full_wave.localization [FOLDER [TRIALS [CASE …]]]``. It
-takes about two minutes a trial on two idle cores, keeps what it solved in FOLDER (by default
-``full_wave_localization``) and continues there when started again.
+takes about two minutes a trial on two idle cores, stores solutions in FOLDER (by default
+``full_wave_localization``) and reuses them when started again.
 
 The scene is the thesis' figures 4.9 to 4.12 at full size: 260 positions 0.5 mm apart, 220 to
 295 GHz in 1001 points, a conducting wall 0.40 m long, 0.8 m away and turned by 45°, the user
 1 m behind it. Echo and uplink are solutions of Maxwell's equations in two dimensions
 (:mod:`validation.full_wave.method_of_moments`), with cylindrical waves; noise of 20 dB SNR is added
-as the simulator does. Beside each trial stands the simulator's own of the *same* frozen wall and
-the same noise, so that what differs is physical optics alone.
+as in the simulator. Each trial is compared with the simulator's result for the *same* frozen wall
+and the same noise, which differs by physical optics alone.
 
-Chosen: the beam is that of a line source at a complex place, an exact solution, with the
+Chosen: the beam is that of a line source at a complex position, an exact solution, with the
 thesis' width of 0.1 rad on its axis; the direct path from user to array is left out, as the
-beam sends nothing there (50 dB down at 0.48 rad). Roughness: that of ``slam_2d`` (0.05 mm rms,
+beam is 50 dB down there (at 0.48 rad). Roughness: that of ``slam_2d`` (0.05 mm rms,
 0.3 mm long, Gaussian) and a rougher one (0.15 mm, 1 mm). Fields are solved for at some 300
 Chebyshev frequencies and interpolated (:mod:`validation.full_wave.band_interpolation`).
 
@@ -71,15 +71,15 @@ HALF_SIZE = (
     f"objects.{WALL}.length_m=0.2",
     f"users.{USER}.position_m=[0.45, 0.4]",
 )
-"""A quick variant, of half the size in all lengths: some 15 s a trial."""
+"""Overrides of a quick variant with half of all lengths: some 15 s a trial."""
 
 PER_CORRELATION_LENGTH = 3.0
 """Grid points for each correlation length: an error of 1e-3 of the echo, 40 dB below the noise,
 up to slopes of 0.3 rms; 1e-2 at 0.2 mm rms, l = 0.3 mm. [-]"""
 
 PROFILE_POINTS = 10.0
-"""Points of the profile for each correlation length: through fewer, a spline's third
-derivative jumps enough to be seen, 5e-4 of the echo at 4. [-]"""
+"""Points of the profile for each correlation length: jumps in the third derivative of a spline
+through fewer have an effect, 5e-4 of the echo at 4. [-]"""
 
 REGION = float(chi2.ppf(0.999, 2))
 MOST_MEDIAN, MOST_WORST = 0.4e-3, 1.0e-3
@@ -90,11 +90,11 @@ Advance = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
-    """What the estimator made of one measurement."""
+    """Errors of the estimate of one measurement."""
 
     status: str
-    error: float  # of the user, NaN if there is no answer [m]
-    square: float  # of it, over its covariance; NaN if there is no answer [-]
+    error: float  # of the user, NaN without a position [m]
+    square: float  # normalised square of that error; NaN without a position [-]
     wall_angle: float  # of the mirror nearest to the wall, NaN without one [rad]
     wall_offset: float  # of the wall's centre from it [m]
 
@@ -124,7 +124,7 @@ class Case:
 
 
 def strip_scene(scenario: Scenario, *, seed: int) -> StripScene:
-    """Hand the scenario's frozen wall and its user to the full-wave solver.
+    """Convert the scenario's frozen wall and its user for the full-wave solver.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def strip_scene(scenario: Scenario, *, seed: int) -> StripScene:
 
 
 def noisy_measurement(scenario: Scenario, fields: StripFields, *, seed: int) -> Measurement:
-    """Record noise-free fields as the scenario's radio does; the noise is the same for any."""
+    """Add the scenario's noise to noise-free fields; its stream does not depend on the fields."""
     signals = {"echo": fields.echo, f"uplink/{USER}": fields.uplinks[0]}
     recorded = received(signals, scenario, seed=seed, sample=0)
     station, frequencies = scenario.base_station, scenario.radio.frequencies
@@ -239,11 +239,11 @@ def localization(
     trials
         Realisations; seed 0 is the first.
     overrides
-        More of them, such as :data:`HALF_SIZE`.
+        Further overrides, such as :data:`HALF_SIZE`.
     folder
-        Keeps what was solved.
+        Cache of solutions.
     advance
-        Told each trial.
+        Called after each trial.
     """
     scenario = load_scenario("slam_2d", (*CASES[name], *overrides))
     done = []
@@ -254,7 +254,7 @@ def localization(
 
 
 def table_row(name: str, trial: Trial) -> str:
-    """Describe one trial in a line."""
+    """Return the line of one trial."""
     cells = [
         f"{what} {one.status:9s} {1e3 * one.error:6.3f} mm (χ² {one.square:5.2f}), wall "
         f"{np.degrees(one.wall_angle):.4f}° {1e3 * one.wall_offset:+.4f} mm"
@@ -267,7 +267,7 @@ def table_row(name: str, trial: Trial) -> str:
 
 
 def summary(case: Case) -> str:
-    """Describe one roughness in a line."""
+    """Return the line of one roughness."""
     cells = []
     for what in ("full_wave", "simulated"):
         results = [getattr(trial, what) for trial in case.trials]
@@ -303,7 +303,7 @@ def draw(ax: Axes, case: Case) -> None:
 
 
 def fails(case: Case) -> list[str]:
-    """Return the claims that do not hold, of full-wave data."""
+    """Return the claims for full-wave data that do not hold."""
     said = [
         f"{case.name}, seed {trial.seed}: {trial.full_wave.status}, error "
         f"{1e3 * trial.full_wave.error:.3f} mm, χ² {trial.full_wave.square:.1f} of {REGION:.1f}"

@@ -1,22 +1,21 @@
-r"""Over which roughness the ray-traced model may be trusted: simulator against full wave.
+r"""Range of validity of the ray-traced model over roughness: simulator against full wave.
 
 Run as ``python -m validation.experiments.full_wave.roughness [FIGURE.png [FOLDER]]``. It takes some
 ten minutes on two cores, and continues where it was stopped if FOLDER is given.
 
-Not in the thesis, which calculates with full waves only. A conducting wall of 8 cm takes the
-place of its 40 cm; all else is the scene of its figures 4.9 to 4.12: the wall 0.8 m away and
+Not in the thesis, which calculates with full waves only. The wall has 8 cm instead of 40 cm; all
+else is the scene of its figures 4.9 to 4.12: a conducting wall 0.8 m away and
 turned by 45°, an aperture of 13 cm, 220 to 295 GHz, a user 1 m behind the wall with a beam of
-0.1 rad. Positions 1 mm apart and 501 frequencies do for so short a wall, and the fields are
+0.1 rad. Positions 1 mm apart and 501 frequencies suffice for so short a wall, and the fields are
 solved for at some 90 of them (:mod:`validation.full_wave.band_interpolation`). For each rms height
 and correlation length (Gaussian) the same frozen realisations are given to the simulator, as a
-scenario, and to the method of moments; cylindrical waves, no noise. What is compared, over all
-realisations at once, by magnitude of the complex correlation and by level, simulated over full
-wave:
+scenario, and to the method of moments; cylindrical waves, no noise. Compared, over all
+realisations together, by magnitude of the complex correlation and by level, simulated over full
+wave, are
 
-- the echo, of the wall with its edges, which count five times as much as those of the thesis'
+- the echo of the wall with its edges, whose relative weight is five times that of the thesis'
   wall;
-- the back-projected image within 1 cm of the wall but for its outer 1.5 cm: the rough wall alone,
-  and the measure of whether walls are imaged as they should be;
+- the back-projected image within 1 cm of the wall without its outer 1.5 cm: the rough wall alone;
 - the uplink.
 
 The simulator sums rough walls by the small-slope approximation and their edges by fringe currents
@@ -29,11 +28,11 @@ Claims that are asserted (:data:`LIMITS`), for each wall:
 - up to a slope of 0.15 the echo's correlation is at least 0.992 and its level within 0.5 dB, the
   pilot's 0.995 and 0.3 dB;
 - up to 0.35, the same with 0.985 for the echo;
-- up to 0.6, echo and pilot are within 1 dB. Steeper walls are drawn, and not claimed; ``simulate``
-  says so.
+- up to 0.6, echo and pilot are within 1 dB. Steeper walls are drawn, but nothing is claimed for
+  them; ``simulate`` reports this.
 
-Tangent planes alone, as they were summed before, are off by 6 dB where heights are small and short
-(Bragg scattering: :math:`\cos^2\theta` for 1, at 45°) and by 4.8 dB where only the edges echo.
+The error of tangent planes alone would be 6 dB for small heights of short correlation length (Bragg
+scattering: :math:`\cos^2\theta` for 1, at 45°), and 4.8 dB if only the edges scatter.
 """
 
 import csv
@@ -67,7 +66,7 @@ RMS_MM = (0.02, 0.05, 0.10, 0.15, 0.20, 0.30)
 CORRELATION_MM = (0.2, 0.3, 0.5, 1.0, 2.0)
 STATISTICS = tuple(itertools.product(RMS_MM, CORRELATION_MM))
 QUICK = ((0.02, 0.2), (0.02, 2.0), (0.15, 1.0))
-"""Statistics of the quick variant, for one realisation: Bragg waves, edges, and long waves."""
+"""Statistics of the quick variant, for one realisation: Bragg scattering, edges, long waves."""
 
 REALISATIONS = 2
 
@@ -82,24 +81,24 @@ SHORT_WALL = (
 """Overrides of ``slam_2d``."""
 
 EDGE, DEPTH, PIXEL = 0.015, 0.01, 0.001
-"""What is left out of the image at each end of the wall; its depth to either side of it; a
-pixel, half a range resolution. [m]"""
+"""Length left out of the image at each end of the wall; depth of the image to either side of the
+wall; pixel, half a range resolution. [m]"""
 
 TRUSTED_CORRELATION, TRUSTED_LEVEL_DB = 0.985, 0.5
-"""From where on a part of the measurement is outlined as trusted: the claim on slopes up to 0.35.
-[-], [dB]"""
+"""Least correlation and largest level error at which a part of the measurement is outlined as
+valid: those of the claim on slopes up to 0.35. [-], [dB]"""
 
 MOST_ERROR = 0.01
-"""Of the full-wave fields over frequency: 5e-5 of a correlation. [-]"""
+"""Largest interpolation error of the full-wave fields: 5e-5 of a correlation. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What is claimed of walls up to a slope."""
+    """Claims for walls up to a slope."""
 
     slope: float  # √2 rms/length [-]
     echo: float  # least correlation [-]
-    echo_level_db: float  # most deviation
+    echo_level_db: float  # largest deviation
     uplink: float
     uplink_level_db: float
 
@@ -109,11 +108,11 @@ LIMITS = (
     Limits(slope=0.35, echo=0.985, echo_level_db=0.5, uplink=0.995, uplink_level_db=0.3),
     Limits(slope=0.60, echo=0.0, echo_level_db=1.0, uplink=0.0, uplink_level_db=1.0),
 )
-"""From the small-slope approximation against full wave: what is left out goes with the third power
-of slopes; 0.5 dB is a part in 17 of an amplitude."""
+"""Limits of the small-slope approximation against full wave: its error is of third order in slopes;
+0.5 dB is a part in 17 of an amplitude."""
 
 SLOPE_ROUNDING = 5e-3
-"""0.05 mm over 0.2 mm is counted among the slopes of 0.35. [-]"""
+"""Tolerance by which 0.05 mm over 0.2 mm belongs to the slopes up to 0.35. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,11 +135,11 @@ class Comparison:
 
     @property
     def limits(self) -> Limits | None:
-        """What is claimed of this wall; None: nothing."""
+        """Claims for this wall; None: none."""
         return next((one for one in LIMITS if self.slope <= one.slope + SLOPE_ROUNDING), None)
 
     def trusted(self, part: Part) -> bool:
-        """Whether one part of the measurement is good enough."""
+        """Whether one part of the measurement agrees within the limits."""
         level = abs(getattr(self, f"{part}_level_db"))
         correlation = float(getattr(self, part))
         return correlation >= TRUSTED_CORRELATION and level <= TRUSTED_LEVEL_DB
@@ -163,9 +162,9 @@ def compare(
     realisations
         Draws of the wall; seed 0 is the first.
     overrides
-        More of them.
+        Further overrides.
     folder
-        Keeps what was solved.
+        Cache of solutions.
     """
     roughness = (
         f"objects.{WALL}.roughness.rms_mm={rms_mm}",
@@ -250,7 +249,7 @@ def draw(comparisons: tuple[Comparison, ...]) -> Figure:
 
 
 def draw_on(figure: Figure, comparisons: tuple[Comparison, ...]) -> None:
-    """Draw the map: six panels with their numbers, and what is trusted within a line."""
+    """Draw the map: six panels with their numbers, and the valid range outlined."""
     axes = figure.subplots(2, 3)
     titles: tuple[tuple[Part, str], ...] = (
         ("image", "image of the wall, without edges"),
@@ -313,7 +312,7 @@ def _draw_panel(
 
 
 def check(comparisons: tuple[Comparison, ...]) -> list[str]:
-    """Compare with the claims; return a line for each, or fail.
+    """Check the claims; return a line for each.
 
     Raises
     ------
@@ -334,7 +333,7 @@ def check(comparisons: tuple[Comparison, ...]) -> list[str]:
 
 
 def table_row(one: Comparison) -> str:
-    """Describe one roughness in a line."""
+    """Return the line of one roughness."""
     return (
         f"rms {one.rms_mm:.2f} mm, l {one.correlation_mm:.1f} mm: echo {one.echo:.3f} "
         f"{one.echo_level_db:+.2f} dB, image {one.image:.3f} {one.image_level_db:+.2f} dB, uplink "

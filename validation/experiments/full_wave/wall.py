@@ -1,21 +1,21 @@
-r"""The method of moments on its own: how exact and how fast it is, and its longest run.
+r"""The method of moments by itself: accuracy, speed, and solution of the thesis' wall.
 
 Run as ``python -m validation.experiments.full_wave.wall`` for the checks (half a minute), or as
 ``python -m validation.experiments.full_wave.wall FILE.npz [REFERENCE.npz]`` to solve the thesis'
 wall at full size and write it in the layout of :mod:`validation.full_wave.wall_comparison`: 0.40 m
 long, 0.8 m away, 260 positions, 1001 frequencies from 220 to 295 GHz, the user 1 m behind it with
-an open and with a beam antenna. What is solved is kept in the folder ``FILE.parts`` and taken up
-again when started anew. The wall is that of REFERENCE, which is then compared with, or else a draw
-of 0.15 mm rms, l = 1 mm.
+an isotropic and with a beam antenna. Solved frequencies are stored in the folder ``FILE.parts`` and
+reused if started again. The wall is that of REFERENCE, with which the result is then compared, or
+else a realisation of 0.15 mm rms, l = 1 mm.
 
 The thesis leaves the roughness open. The check of speed is a rough wall of 8 cm at 61
 frequencies, for which 30 s are allowed on two cores.
 
-Claims that are asserted: against the series of a cylinder ten wavelengths thick the solution is
-exact to 1e-7, against twice as many unknowns on the short wall to 1e-4 (the accuracy that its
-correlation length's grid is chosen for), and the short wall takes at most 30 s. Against the
-stored solution of another author's code, at the ends of the band, and against a REFERENCE, echo
-and uplinks agree to 1e-4: that one's own accuracy is 4e-6, and complex64.
+Claims that are asserted: the error against the series of a cylinder ten wavelengths thick is below
+1e-7, against twice as many unknowns on the short wall below 1e-4 (the accuracy for which the grid
+per correlation length is chosen), and the short wall takes at most 30 s. Echo and uplinks agree
+with the stored solution of an independent code, at the ends of the band, and with a REFERENCE, to
+1e-4; the stored one's own accuracy is 4e-6, in complex64.
 """
 
 import sys
@@ -63,11 +63,11 @@ MOST_SECONDS = 30.0
 
 @dataclass(frozen=True, kw_only=True)
 class SolverCheck:
-    """What the checks gave."""
+    """Results of the checks."""
 
     series_error: float  # of a cylinder's scattered field, relative [-]
     refinement: float  # change of the short wall's echo with twice the unknowns, relative [-]
-    reference_error: float  # worst of echo and uplinks of the stored wall, relative [-]
+    reference_error: float  # largest of echo and uplinks of the stored wall, relative [-]
     seconds: float  # for the short wall
     frequencies: int  # of it
 
@@ -119,7 +119,7 @@ def cylinder_error() -> float:
 def thesis_wall(
     reference: dict[str, np.ndarray] | None = None,
 ) -> tuple[StripScene, Float[np.ndarray, " freqs"]]:
-    """Return the wall at full size with an open and a beam user, and its frequencies in Hz."""
+    """Return the wall at full size with an isotropic and a beam user, and frequencies in Hz."""
     if reference is None:
         scenario: Scenario = load_scenario("slam_2d", ROUGHNESS)
         scene = strip_scene(scenario, seed=0)
@@ -128,7 +128,7 @@ def thesis_wall(
     place = reference["user_position"][:2]
     wall = reference["wall_profile"][:, :2]
     aim = (wall[0] + wall[-1]) / 2 - place
-    # The beam looked at the mean line's middle: the profile's ends have heights of their own.
+    # The beam is aimed at the mean line's middle: the profile's ends have heights.
     aim = np.round(aim, 3)
     scene = StripScene(
         profile=reference["wall_profile"],
@@ -159,7 +159,7 @@ def relative_error(one: Complex[np.ndarray, "*n"], other: Complex[np.ndarray, "*
 
 
 def check(result: SolverCheck) -> list[str]:
-    """Compare with the claims; return a line for each, or fail.
+    """Check the claims; return a line for each.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def check(result: SolverCheck) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Check the solver, or solve the thesis' wall; 1 if a comparison falls short."""
+    """Check the solver, or solve the thesis' wall; return 1 if agreement is insufficient."""
     if not arguments:
         for line in check(solver_check()):
             print(line)
