@@ -32,7 +32,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from simulator.materials.facet_reflection import STEEP, node_count
+from simulator.materials.facet_reflection import STEEP, node_count, over_angles
 from simulator.materials.fresnel_slab import Coefficients, Dielectric, transmission
 
 CLOSEST = 0.25
@@ -222,7 +222,8 @@ def _in_turn(
     """Yield each slab's transmission of the refracted rays [rays, freqs], and its normal."""
     for material, normal in crossings:
         cosines = np.abs(np.einsum("rx,x->r", bent.directions, normal))
-        yield inserted(material, frequencies, cosines), normal
+        both = over_angles(partial(inserted, material), frequencies, cosines)
+        yield Coefficients(both.te.T, both.tm.T), normal
 
 
 def _common(

@@ -224,6 +224,7 @@ class Leg:
             self.facing = np.einsum("fx,fx->f", self.direction, facets.relief.normals)
         self.lit = ports.visible[index] & (facets.two_sided | (self.facing > 0))
         self.pattern, self.polarization = ports.pattern, ports.polarization
+        self._places = np.cumsum(self.lit) - 1  # of lit facets among those
         self._gains: dict[int, np.ndarray] = {}
         self._along: np.ndarray | None = None
 
@@ -245,7 +246,8 @@ class Leg:
     def gain(
         self, some: np.ndarray, nodes: Float[np.ndarray, " nodes"]
     ) -> Float[np.ndarray, "#nodes facets"] | Complex[np.ndarray, "#nodes facets"]:
-        """Field pattern of the port towards some of the facets."""
+        """Field pattern of the port towards some of the facets that are lit."""
         if nodes.size not in self._gains:  # all parts' nodes span the same band
-            self._gains[nodes.size] = self.pattern(-self.direction, self.distance, nodes)
-        return self._gains[nodes.size][:, some]
+            lit = self.lit
+            self._gains[nodes.size] = self.pattern(-self.direction[lit], self.distance[lit], nodes)
+        return self._gains[nodes.size][:, self._places[some]]

@@ -158,7 +158,8 @@ def _by_kernel(
     def gain(ports: Ports, index: int) -> Float[np.ndarray, " facets"] | None:
         if ports.pattern is isotropic:
             return None
-        return np.asarray(Leg(facets, ports, index).gain(np.arange(facets.count), nodes)[0].real)
+        leg = Leg(facets, ports, index)
+        return np.asarray(ports.pattern(-leg.direction, leg.distance, nodes)[0].real)
 
     spectrum = np.zeros((count, frequencies.size), dtype=np.complex128)
     for part in parts:

@@ -53,7 +53,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Complex, Complex64, Float, Int
@@ -61,7 +61,7 @@ from scipy.constants import speed_of_light
 
 from scenes.schema.radio import Polarization
 from simulator.materials.facet_reflection import over_angles
-from simulator.materials.fresnel_slab import Dielectric, Material
+from simulator.materials.fresnel_slab import Dielectric, Material, reflection
 
 STEP = 0.01
 """Step of the direction's component along the line (a cosine) between filtered heights, which are
@@ -146,7 +146,7 @@ def _coefficient(
 ) -> Complex[np.ndarray, "nodes facets"]:
     """Return Fresnel's coefficients, interpolated over angle if there are many facets."""
     of = replace(material, thickness=np.inf) if half_space else material
-    both = over_angles(of, frequencies, cosines)
+    both = over_angles(partial(reflection, of), frequencies, cosines)
     return np.asarray(both.te if vertical else both.tm)
 
 
