@@ -140,7 +140,12 @@ class Scenario(Checked):
                 clearance=self.radio.longest_wavelength,
             ),
             *facet_problems(
-                self.objects, self.radio.shortest_wavelength, flat=self.dimensions == 2
+                self.objects,
+                self.radio.shortest_wavelength,
+                flat=self.dimensions == 2,
+                mirrors_longer_than=self.radio.longest_wavelength
+                if self.dimensions == 3 and not self.base_station.multistatic
+                else None,
             ),
             *inconsistencies(
                 self.objects,

@@ -15,6 +15,7 @@ from scenes.surfaces.facet_spacing import (
     facet_spacing,
     mesh_facet_count,
 )
+from scenes.surfaces.level_of_detail import flat_and_smooth
 
 
 def facet_counts(
@@ -44,6 +45,7 @@ def facet_problems(
     shortest_wavelength: float,
     *,
     flat: bool = False,
+    mirrors_longer_than: float | None = None,
 ) -> list[str]:
     """Find impossible roughness parameters, and objects whose facets do not fit into memory.
 
@@ -55,6 +57,9 @@ def facet_problems(
         At the highest frequency of the radio. [m]
     flat
         Whether the scene has two dimensions, so that meshes become lines.
+    mirrors_longer_than
+        The longest wavelength, where smooth flat bodies need no facets
+        (:mod:`scenes.surfaces.level_of_detail`); None where they do. [m]
 
     Returns
     -------
@@ -64,7 +69,14 @@ def facet_problems(
     for name, body in objects.items():
         if not isinstance(body, MeshFile):
             found += _roughness_problems(name, body)
-    counts = facet_counts(objects, shortest_wavelength, flat=flat)
+    counted = dict(objects)
+    if mirrors_longer_than is not None:
+        counted = {
+            name: body
+            for name, body in objects.items()
+            if not flat_and_smooth(body, mirrors_longer_than)
+        }
+    counts = facet_counts(counted, shortest_wavelength, flat=flat)
     needed = sum(counts.values()) * BYTES_PER_FACET
     if needed > MOST_BYTES:
         name = max(counts, key=lambda key: counts[key])

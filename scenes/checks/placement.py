@@ -5,8 +5,7 @@ exact and convex, and so is its least value along a row of elements.
 """
 
 import math
-from collections.abc import Mapping
-from itertools import combinations
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -58,7 +57,7 @@ def inconsistencies(
             found.append(
                 f"base_station.position_m = {_xyz(array.mean(axis=(0, 1)))}: the array is "
                 f"{_closeness(body, distance)} objects.{name} at {_xyz(place)} m; it must keep "
-                f"{needed} away; move the array or the object"
+                f"{needed} away; move the array or the object{_room(body, distance)}"
             )
         for user, position in users.items():
             distance = float(_distances(body, position[None, :], clearance)[0])
@@ -66,7 +65,7 @@ def inconsistencies(
                 found.append(
                     f"users.{user}.position_m = {_xyz(position)}: is "
                     f"{_closeness(body, distance)} objects.{name}; it must keep {needed} away; "
-                    "move the user or the object"
+                    f"move the user or the object{_room(body, distance)}"
                 )
     for user, position in users.items() if array is not None else ():
         distance = float(np.linalg.norm(array - position, axis=-1).min())
@@ -75,7 +74,7 @@ def inconsistencies(
                 f"users.{user}.position_m = {_xyz(position)}: is {distance * 1e3:.3g} mm from an "
                 f"element of the base station; it must keep {needed} away; move the user"
             )
-    for (first, one), (second, other) in combinations(objects.items(), 2):
+    for (first, one), (second, other) in _near_pairs(objects):
         if _overlap(one, other):
             found.append(
                 f"objects.{second}.centre_m = {_xyz(np.array(other.centre_m))}: the solid "
@@ -189,6 +188,36 @@ def _distances(
     return signed_distance(body, points)
 
 
+def _near_pairs(
+    objects: Mapping[str, Upright | MeshFile],
+) -> Iterator[tuple[tuple[str, Upright | MeshFile], tuple[str, Upright | MeshFile]]]:
+    """List the pairs of solids whose bounding boxes meet."""
+    solids = [(name, body) for name, body in objects.items() if not isinstance(body, Plate)]
+    boxes = [_bounds(body) for _, body in solids]
+    if len(boxes) < 2:
+        return
+    low, high = np.stack([one[0] for one in boxes]), np.stack([one[1] for one in boxes])
+    for first, pair in enumerate(solids):
+        meet = (low[first + 1 :] <= high[first]) & (high[first + 1 :] >= low[first])
+        for second in np.flatnonzero(meet.all(axis=-1)).tolist():
+            yield pair, solids[first + 1 + second]
+
+
+def _bounds(body: Upright | MeshFile) -> Float[np.ndarray, "2 3"]:
+    """Return the lowest and highest corner of a box around a body; endless without a height [m]."""
+    if isinstance(body, MeshFile):
+        return placed_mesh(body).bounds
+    half_height = math.inf if body.height_m is None else body.height_m / 2
+    if isinstance(body, Cylinder):
+        across = np.array([body.radius_m, body.radius_m])
+    else:
+        depth = body.depth_m if isinstance(body, Box) else 0.0
+        sides = np.abs(np.stack([body.tangent, body.across]))[:, :2]
+        across = np.array([body.length_m, depth]) / 2 @ sides
+    reach = np.array([*across, half_height])
+    return np.stack([body.centre - reach, body.centre + reach])
+
+
 def _overlap(one: Upright | MeshFile, other: Upright | MeshFile) -> bool:
     if isinstance(one, Plate) or isinstance(other, Plate):
         return False
@@ -235,6 +264,13 @@ def _mesh_overlap(one: Cylinder | Box | MeshFile, other: Cylinder | Box | MeshFi
         elif (signed_distance(outer, points) < -TOUCHING).any():
             return True
     return False
+
+
+def _room(body: Upright | MeshFile, distance: float) -> str:
+    """Say what makes a body a room, if an antenna stands in it."""
+    if distance < 0 and isinstance(body, MeshFile):
+        return ", or set hollow = true if it is a room that is seen from within"
+    return ""
 
 
 def _closeness(body: Upright | MeshFile, distance: float) -> str:

@@ -2,17 +2,24 @@
 
 import functools
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from jaxtyping import Float
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from scenes.meshes.mesh_file import mesh_contains
 from scenes.meshes.mitsuba_xml import ForeignMaterial, ForeignShape, read_mitsuba_xml
 from scenes.schema.errors import ScenarioError, did_you_mean, problems
 from scenes.schema.materials import MATERIALS, SLABS, usual_texture
+from scenes.schema.objects import MeshFile
 from scenes.schema.quantities import Checked
+
+DEEP = 1e-6
+"""Depth in a closed shape from which an antenna counts as within it [m]."""
 
 _THE_FILES = ("kind", "file", "matrix", "facets")  # keys of an object that the file decides
 
@@ -86,7 +93,8 @@ def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
     A material of the ITU-R P.2040 keeps its name and thickness unless told otherwise, a radio
     material its permittivity, conductivity and thickness; for all others the table says what they
     are. A scattering coefficient is not taken over: an object's ``roughness`` says what scatters.
-    What was told about a shape goes before what was told about its material.
+    What was told about a shape goes before what was told about its material. A closed shape in
+    which the base station or a user stands is a room: hollow, unless the table says otherwise.
 
     Parameters
     ----------
@@ -135,6 +143,7 @@ def with_geometry(data: Mapping[str, object]) -> dict[str, object]:
         objects[shape.name] = body
     if found:
         raise ScenarioError("\n".join(dict.fromkeys(found)))
+    _open_rooms(objects, _antennas(plain))
     return {**plain, "objects": {**objects, **own}}
 
 
@@ -185,6 +194,33 @@ def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
         # Its roughness is in its facets; without this it would get its material's usual one.
         body["roughness"] = {"rms_mm": 0.0, "correlation_mm": 1.0}
     return body
+
+
+def _antennas(plain: Mapping[str, object]) -> Float[np.ndarray, "antennas 3"]:
+    """Return where the base station and the users stand, as far as that can be read [m]."""
+    station, users = plain.get("base_station"), plain.get("users")
+    tables = [station if isinstance(station, Mapping) else {}]
+    tables += list(users.values()) if isinstance(users, Mapping) else []
+    places = [np.zeros((0, 3))]
+    for table in tables:
+        given = table.get("position_m", [0.0, 0.0]) if isinstance(table, Mapping) else None
+        if isinstance(given, Sequence) and all(isinstance(one, float | int) for one in given):
+            at = [float(one) for one in given][:3]
+            places.append(np.array([at + [0.0] * (3 - len(at))]))
+    return np.concatenate(places)
+
+
+def _open_rooms(objects: dict[str, object], places: Float[np.ndarray, "antennas 3"]) -> None:
+    """Make closed meshes with antennas in them shells that are seen from within: rooms."""
+    for body in objects.values():
+        if not isinstance(body, dict) or "hollow" in body or "solid" in body:
+            continue
+        try:
+            mesh = MeshFile.model_validate(body)
+        except ValidationError:  # the scenario's own check says so
+            continue
+        if mesh_contains(mesh, places, deeper_than=DEEP).any():
+            body["hollow"] = True
 
 
 def _made_of(material: ForeignMaterial) -> dict[str, object]:

@@ -53,8 +53,25 @@ def placed_mesh(body: MeshFile) -> TriangleMesh:
     return _placed(body, status.st_mtime_ns, status.st_size)
 
 
-@functools.lru_cache(maxsize=16)
+SMALL_FILE = 2**17
+"""Mesh files up to this size are kept by the thousand: a town has one for each house [byte]."""
+
+
 def _placed(body: MeshFile, changed: int, size: int) -> TriangleMesh:
+    return (_placed_small if size <= SMALL_FILE else _placed_large)(body, changed, size)
+
+
+@functools.lru_cache(maxsize=8192)
+def _placed_small(body: MeshFile, changed: int, size: int) -> TriangleMesh:
+    return _read_and_placed(body)
+
+
+@functools.lru_cache(maxsize=16)
+def _placed_large(body: MeshFile, changed: int, size: int) -> TriangleMesh:
+    return _read_and_placed(body)
+
+
+def _read_and_placed(body: MeshFile) -> TriangleMesh:
     read = _read(body.file)
     axes = np.stack([body.tangent, body.across, np.array([0.0, 0.0, 1.0])])
     vertices = read.vertices

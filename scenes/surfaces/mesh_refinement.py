@@ -53,7 +53,7 @@ def mesh_surface(body: MeshFile, spacing: float, heights: Heights) -> Shape:
     if heights.smooth:
         mean, cells, _ = refined(vertices, faces, np.zeros(len(faces), dtype=np.int64), spacing)
         return Shape(vertices=mean, mean_vertices=mean, cells=cells)
-    patches = _flat_patches(mesh)
+    patches = flat_patches(mesh)
     _refuse_small(body, mesh, patches, heights.longest)
     mean, cells, patches = refined(vertices, faces, patches, spacing)
     return Shape(
@@ -123,7 +123,8 @@ def _cut(
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
-def _flat_patches(mesh: TriangleMesh) -> Int[np.ndarray, " faces"]:
+def flat_patches(mesh: TriangleMesh) -> Int[np.ndarray, " faces"]:
+    """Return, for each triangle of a mesh, the number of the flat face that it is part of."""
     one, other = np.moveaxis(mesh.normals[mesh.neighbours], 1, 0)
     cosines = np.einsum("px,px->p", one, other)
     angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), cosines)

@@ -7,13 +7,15 @@ from scenes.meshes.triangle_mesh import TriangleMesh
 from scenes.realisations.object_surface import Surface, object_surface
 from scenes.scenario import Scenario
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
+from scenes.surfaces.level_of_detail import flat_and_smooth
 from simulator.geometry.flat_faces import flat_faces
 from simulator.geometry.mirrors import Mirrors, line_mirrors
 from simulator.materials.fresnel_slab import Absorber, Conductor, Material
 
 MOST_FACES = 64
 """Most flat faces of a mesh whose faces are mirrors; beyond, it counts as curved, because the
-number of chains grows as a power of the number of mirrors. [-]"""
+number of chains grows as a power of the number of mirrors, unless it is smooth and its faces are
+wide (:mod:`scenes.surfaces.level_of_detail`). [-]"""
 
 _SAME_PLANE = 1e-9  # largest distance between the planes of a rectangle's two triangles [m]
 _SAME_NORMAL = 1e-12  # largest 1 - cosine between their normals: 1.4 µrad; rounding is 1e-16 [-]
@@ -61,7 +63,11 @@ def mean_mirrors(
             flat = flat_faces(TriangleMesh(vertices=surface.vertices, faces=surface.cells))
         else:
             flat = _flat_mirrors(surface)
-        if isinstance(body, MeshFile) and len(flat) > MOST_FACES:
+        if (
+            isinstance(body, MeshFile)
+            and len(flat) > MOST_FACES
+            and not flat_and_smooth(body, scenario.radio.longest_wavelength)
+        ):
             continue
         if isinstance(body, Plate | Box) and surface.cells.shape[1] == 3:
             flat = _quadrilaterals(flat)

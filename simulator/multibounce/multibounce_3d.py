@@ -77,7 +77,7 @@ def coherent_echo(
     echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
     most = scene.scenario.max_bounces - 1
     among = scene.mirrors
-    if most < 1 or among is None:
+    if among is None:
         return echo
     order = {name: index for index, name in enumerate(scene.scattering)}
     names = [name for name in among.targets if name in order]
@@ -235,12 +235,16 @@ def _look_up(
 def _over_mirrors_alone(
     scene: RadioScene, among: SceneMirrors, send: AntennaGroup, receive: AntennaGroup
 ) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the chains that return to the array over two and more mirrors, without a target."""
+    """Sum the chains that return to the array over mirrors, without a target.
+
+    Chains over a single mirror only where its body has no facets.
+    """
     frequencies = scene.scenario.radio.frequencies
     echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
     mirrors = among.mirrors
     for leg in among.chains:
-        if leg.bounces < 2 or any(among.owners[mirror] in among.targets for mirror in leg.sequence):
+        over_target = any(among.owners[mirror] in among.targets for mirror in leg.sequence)
+        if over_target or not among.by_images(leg):
             continue
         image = leg.image(send)
         towards = receive.positions - image.positions

@@ -89,9 +89,9 @@ def simulate_uplink(
 def _over_mirrors(
     scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
 ) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum the specular paths over two and more mirrors, in three dimensions."""
+    """Sum the specular paths in three dimensions; over one mirror if its body has no facets."""
     frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
-    if scene.mirrors is None or most < 2:
+    if scene.mirrors is None:
         return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
     # From the user, a leg's mirrors are met in reverse order; chains that are not legs of the
     # array lie outside its pattern, for any user.
@@ -106,7 +106,7 @@ def _over_mirrors(
             slabs=scene.slabs,
         )
         for leg in scene.mirrors.chains
-        if 2 <= leg.bounces <= most
+        if leg.bounces <= most and scene.mirrors.by_images(leg)
     )
     response: np.ndarray = specular_response(
         scene.mirrors.mirrors,

@@ -6,7 +6,7 @@ of Fresnel's knife edge (ITU-R P.526, eq. 26 to 31). They estimate strength only
 direction.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 from scipy.special import fresnel
 
+from scenes.realisations.object_surface import Surface
 from scenes.scenario import Scenario
 from scenes.schema.effects import Effects
 from scenes.schema.objects import Plate
@@ -31,6 +32,7 @@ from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import find_chains
 from simulator.specular.path_field import specular_response
+from simulator.specular.ray_launching import likely_sequences
 
 MOST_CHAINS = 50_000
 """Most sequences of mirrors searched for a path of one more bounce: some seconds. [-]"""
@@ -42,7 +44,10 @@ FAINT_DB = -60.0
 """Level relative to the strongest path below which nothing is reported. [dB]"""
 
 EDGE_STEP = 0.02
-"""Spacing of the points on a body's edges at which diffraction is evaluated. [m]"""
+"""Spacing of the points on bodies' edges at which diffraction is evaluated. [m]"""
+
+MOST_POINTS = 1_000_000
+"""Most points on all edges together; in large scenes their spacing is larger. [-]"""
 
 
 class LeftOut(NamedTuple):
@@ -160,6 +165,7 @@ class _Room(NamedTuple):
         surfaces, materials = mean_surfaces(scenario), scenario_materials(scenario)
         slabs = scene_slabs(scenario, materials)
         places = [np.empty((0, 3))]
+        step = max(EDGE_STEP, _edge_length(opaque(surfaces, slabs)) / MOST_POINTS)
         for surface in opaque(surfaces, slabs):
             corners = surface.vertices[surface.cells]
             if surface.cells.shape[1] == 2:
@@ -167,7 +173,7 @@ class _Room(NamedTuple):
                 continue
             for first, second in ((0, 1), (1, 2), (2, 0)):
                 along = corners[:, second] - corners[:, first]
-                count = 1 + int(np.linalg.norm(along, axis=-1).max() / EDGE_STEP)
+                count = 1 + int(np.linalg.norm(along, axis=-1).max() / step)
                 share = (np.arange(count) + 0.5)[:, None, None] / count
                 places.append((corners[:, first] + share * along).reshape(-1, 3))
         return cls(
@@ -185,6 +191,9 @@ class _Room(NamedTuple):
         sender, array = self._ends(name)
         if line_of_sight is None:
             line_of_sight = self.scenario.effects.line_of_sight
+        among = None
+        if self.scenario.dimensions == 3:
+            among = likely_sequences(self.mirrors, sender, most)
         chains = find_chains(
             self.mirrors,
             sender.positions,
@@ -194,6 +203,7 @@ class _Room(NamedTuple):
             max_bounces=most,
             min_bounces=max(fewest, 0 if line_of_sight else 1),
             slabs=self.slabs,
+            among=among,
         )
         middle = np.array([self.scenario.radio.centre_frequency])
         levels = [
@@ -250,3 +260,14 @@ class _Room(NamedTuple):
     def _ends(self, name: str) -> tuple[AntennaGroup, AntennaGroup]:
         elements = self.scenario.base_station.element_positions
         return user_group(self.scenario, name), array_group(self.scenario, elements)
+
+
+def _edge_length(surfaces: Sequence[Surface]) -> float:
+    """Sum the edges of triangles, each taken for as long as the longest of its surface. [m]."""
+    total = 0.0
+    for surface in surfaces:
+        if surface.cells.shape[1] == 3:
+            corners = surface.vertices[surface.cells]
+            along = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+            total += float(along.max(axis=0).sum()) * len(along)
+    return total

@@ -40,6 +40,7 @@ from simulator.materials.slab_insertion import (
 )
 from simulator.receiver.impairments import position_jitter
 from simulator.scene.array_antennas import array_group, in_space, needed_reach, sending_group
+from simulator.scene.level_of_detail import mirrored_bodies
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors
 from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.diffuse_chains import diffuse_legs, may_reach
@@ -102,9 +103,16 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
             slabs=slabs,
             surfaces=plain,
         )
-    mirrors = _mirrors(scenario, materials, elements) if in_space(scenario) else None
+    mirrored = mirrored_bodies(scenario, materials, elements)
+    mirrors = None
+    if in_space(scenario):
+        mirrors = _mirrors(scenario, materials, elements, mirrored=mirrored, slabs=slabs)
+    coarse = {surface.name: surface for surface in mean_surfaces(scenario)} if mirrored else {}
     surfaces, scattering = [], {}
     for name, material in materials.items():
+        if name in mirrored:
+            surfaces.append(coarse[name])
+            continue
         absorbs = isinstance(material, Absorber)  # only blocks rays
         reach: Reach | None = None
         if mirrors is not None and not absorbs:
@@ -156,10 +164,19 @@ def _mirrors(
     scenario: Scenario,
     materials: dict[str, Material],
     elements: Float[np.ndarray, "elements 3"],
+    *,
+    mirrored: frozenset[str],
+    slabs: Slabs,
 ) -> SceneMirrors:
     array = array_group(scenario, elements)
     send = sending_group(scenario, elements)
-    return scene_mirrors(scenario, materials, (array,) if send is None else (array, send))
+    return scene_mirrors(
+        scenario,
+        materials,
+        (array,) if send is None else (array, send),
+        mirrored=mirrored,
+        passing=frozenset(slabs.owners),
+    )
 
 
 def true_elements(scenario: Scenario, *, seed: int, sample: int) -> Float[np.ndarray, "elements 3"]:

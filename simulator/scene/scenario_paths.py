@@ -21,9 +21,12 @@ from simulator.geometry.ray_scene import RayScene, blocked, build_scene
 from simulator.geometry.slabs import Slabs
 from simulator.materials.fresnel_slab import Absorber
 from simulator.materials.slab_insertion import LEAST_LEVEL, along_field, through_slabs
+from simulator.scene.array_antennas import array_group
 from simulator.scene.radio_scene import opaque, scenario_materials
+from simulator.scene.scene_mirrors import LARGEST_TARGET, longest_side
 from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.image_method import Chain, find_chains
+from simulator.specular.ray_launching import likely_sequences
 
 PLACES = 17
 """Places on each line of a target from which paths to the array are sought."""
@@ -68,8 +71,9 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     Returns
     -------
     First the users' paths, then those to the nearest place of each object other than plates; by
-    number of bounces. For separate antennas, the path from the first transmitter over each mirror
-    to the receiver with the strongest signal.
+    number of bounces. In scenes of too many mirrors to try all sequences, only of objects small
+    enough to be targets. For separate antennas, the path from the first transmitter over each
+    mirror to the receiver with the strongest signal.
 
     Raises
     ------
@@ -82,10 +86,16 @@ def scenario_paths(scenario: Scenario) -> tuple[ScenarioPath, ...]:
     if scenario.base_station.multistatic:
         return tuple(_to_receivers(scenario, mirrors, build_scene(surfaces)))
     slabs = scene_slabs(scenario, materials)
-    room = _Room(mirrors, build_scene(opaque(surfaces, slabs)), slabs)
+    among = None
+    if scenario.dimensions == 3:
+        array = array_group(scenario, scenario.base_station.element_positions)
+        among = likely_sequences(mirrors, array, scenario.max_bounces)
+    room = _Room(mirrors, build_scene(opaque(surfaces, slabs)), slabs, among)
     found = [*_to_users(scenario, room)]
     for surface in surfaces:
         body = scenario.objects[surface.name]
+        if among is not None and longest_side(scenario, surface.name) > LARGEST_TARGET:
+            continue
         if not isinstance(body, Plate) and not isinstance(materials[surface.name], Absorber):
             found += _to_object(scenario, surface, room)
     return tuple(found)
@@ -97,6 +107,7 @@ class _Room(NamedTuple):
     mirrors: Mirrors
     rays: RayScene
     slabs: Slabs
+    among: tuple[tuple[int, ...], ...] | None  # sequences of mirrors to look among; None: all
 
     def through(self, chain: Chain, path: int) -> tuple[int, ...]:
         """Return the set of slabs on each leg of a chain's path."""
@@ -109,7 +120,7 @@ class _Room(NamedTuple):
 
 
 def _to_users(scenario: Scenario, room: _Room) -> Iterator[ScenarioPath]:
-    centre, (mirrors, rays, slabs) = _centre(scenario), room
+    centre, (mirrors, rays, slabs, among) = _centre(scenario), room
     for name, user in scenario.users.items():
         chains = find_chains(
             mirrors,
@@ -119,6 +130,7 @@ def _to_users(scenario: Scenario, room: _Room) -> Iterator[ScenarioPath]:
             clearance=rays.clearance,
             max_bounces=scenario.max_bounces,
             slabs=slabs,
+            among=among,
         )
         for chain in chains:
             if not chain.mirrors and not scenario.effects.line_of_sight:
@@ -193,7 +205,7 @@ def _to_receivers(scenario: Scenario, mirrors: Mirrors, rays: RayScene) -> Itera
 
 
 def _to_object(scenario: Scenario, surface: Surface, room: _Room) -> list[ScenarioPath]:
-    centre, (mirrors, rays, slabs) = _centre(scenario), room
+    centre, (mirrors, rays, slabs, among) = _centre(scenario), room
     places, outward = _places(surface)
     if scenario.max_bounces == 0:
         return []
@@ -206,6 +218,7 @@ def _to_object(scenario: Scenario, surface: Surface, room: _Room) -> list[Scenar
         max_bounces=scenario.max_bounces - 1,
         receiver_offsets=rays.clearance * outward,
         slabs=slabs,
+        among=among,
     )
     # The body's surface is one bounce; the return leg has at least the fewest mirrors.
     lit = [chain for chain in chains if _lit(chain, outward).any()]

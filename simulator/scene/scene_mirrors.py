@@ -1,21 +1,27 @@
 """The mirrors of a 3-D scene, the objects they belong to, and the legs over them within beams."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
 from scenes.scenario import Scenario
+from scenes.schema.errors import ScenarioError
 from scenes.schema.objects import Box, Cylinder, MeshFile, Plate
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.materials.fresnel_slab import Material
-from simulator.specular.image_sources import Leg, legs_within_reach
+from simulator.specular.image_sources import DIRECT, Leg, legs_within_reach
+from simulator.specular.ray_launching import launched_sequences
 
 LARGEST_TARGET = 0.5
 """Longest side of a body that is divided into facets for echoes over mirrors; faces of larger
 bodies are mirrors. [m]"""
+
+MOST_LAUNCHED = 200_000
+"""Most legs that launched rays may find: tracing one takes some 0.3 ms for each user. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +33,24 @@ class SceneMirrors:
     legs: tuple[Leg, ...]  # to targets: one bounce is left for the target
     chains: tuple[Leg, ...]  # up to the largest number of bounces
     targets: tuple[str, ...]  # objects whose facets are illuminated over legs
+    mirrored: frozenset[str] = frozenset()  # objects without facets, which reflect by images
 
     def of(self, name: str) -> frozenset[int]:
         """Mirrors that are faces of an object."""
         return frozenset(index for index, owner in enumerate(self.owners) if owner == name)
 
+    def by_images(self, leg: Leg) -> bool:
+        """Return whether the reflection over a leg is a specular path, not a sum over facets."""
+        return leg.bounces > 1 or self.owners[leg.sequence[0]] in self.mirrored
+
 
 def scene_mirrors(
-    scenario: Scenario, materials: Mapping[str, Material], groups: tuple[AntennaGroup, ...]
+    scenario: Scenario,
+    materials: Mapping[str, Material],
+    groups: tuple[AntennaGroup, ...],
+    *,
+    mirrored: frozenset[str] = frozenset(),
+    passing: Container[str] = (),
 ) -> SceneMirrors:
     """Find a scenario's mirrors, and the legs over them.
 
@@ -44,6 +60,15 @@ def scene_mirrors(
         The scene, and the material of each object.
     groups
         The array's antennas.
+    mirrored
+        Bodies without facets.
+    passing
+        Bodies that transmit waves.
+
+    Raises
+    ------
+    ScenarioError
+        If the antennas reach too many ways over mirrors.
     """
     parts = {
         surface.name: mean_mirrors(scenario, [surface], dict(materials))
@@ -57,16 +82,41 @@ def scene_mirrors(
             [np.empty(0, dtype=bool), *(part.two_sided for part in parts.values())]
         ),
     )
+    owners = tuple(name for name, part in parts.items() for _ in range(len(part)))
     chains: tuple[Leg, ...] = ()
-    if scenario.max_bounces > 1:
-        chains = legs_within_reach(mirrors, groups, scenario.max_bounces)
+    most = scenario.max_bounces
+    if most > 1 or mirrored:
+        through = np.array([owner in passing for owner in owners], dtype=bool)
+        chains = _chains(mirrors, groups, most, through)
+    targets = [name for name in scenario.objects if longest_side(scenario, name) <= LARGEST_TARGET]
     return SceneMirrors(
         mirrors=mirrors,
-        owners=tuple(name for name, part in parts.items() for _ in range(len(part))),
-        legs=tuple(leg for leg in chains if leg.bounces < scenario.max_bounces),
+        owners=owners,
+        legs=tuple(leg for leg in chains if leg.bounces < most),
         chains=chains,
-        targets=tuple(n for n in scenario.objects if longest_side(scenario, n) <= LARGEST_TARGET),
+        targets=tuple(name for name in targets if name not in mirrored),
+        mirrored=mirrored,
     )
+
+
+def _chains(
+    mirrors: Mirrors,
+    groups: tuple[AntennaGroup, ...],
+    most: int,
+    passing: Bool[np.ndarray, " mirrors"],
+) -> tuple[Leg, ...]:
+    """Find the legs within antennas' patterns: all, or those that rays meet if they are many."""
+    tried = legs_within_reach(mirrors, groups, most)
+    if tried is not None:
+        return tried
+    sequences = launched_sequences(mirrors, groups, most, passing=passing)
+    if len(sequences) > MOST_LAUNCHED:
+        raise ScenarioError(
+            f"max_bounces = {most}: the antennas reach more than {MOST_LAUNCHED} ways over up to "
+            f"{most} mirrors; set max_bounces = {most - 1}, or give the base station a narrower "
+            "antenna"
+        )
+    return tuple(DIRECT.onward(mirrors, *sequence) for sequence in sequences)
 
 
 def longest_side(scenario: Scenario, name: str) -> float:

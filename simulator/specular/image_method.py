@@ -4,7 +4,8 @@ One :class:`Chain` holds all paths over the same sequence of mirrors, from many 
 many receivers at once: along a chain, lengths and angles vary smoothly over the array.
 """
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -70,6 +71,7 @@ def find_chains(
     receivers_on: int | None = None,
     receiver_offsets: Float[np.ndarray, "receivers 3"] | None = None,
     slabs: Slabs | None = None,
+    among: Iterable[tuple[int, ...]] | None = None,
 ) -> tuple[Chain, ...]:
     """Find all specular paths of up to ``max_bounces`` bounces.
 
@@ -91,6 +93,8 @@ def find_chains(
         Moves the receivers, for the occlusion test only, off the surface they lie on. [m]
     slabs
         Transmitting surfaces; the chains record which of them their legs cross.
+    among
+        Candidate sequences of mirrors, from the sources onward; None: all are tried.
 
     Returns
     -------
@@ -98,7 +102,10 @@ def find_chains(
     """
     ends = receivers if receiver_offsets is None else receivers + receiver_offsets
     found = []
-    for sequence, images in _sequences(mirrors, sources, max_bounces):
+    candidates = _sequences(mirrors, sources, max_bounces)
+    if among is not None:
+        candidates = _given(mirrors, sources, among, max_bounces)
+    for sequence, images in candidates:
         last_is_own = bool(sequence) and sequence[-1] == receivers_on
         if len(sequence) < min_bounces or last_is_own:
             continue
@@ -133,10 +140,7 @@ def trace_chain(
     paired
         Each source is linked with the receiver of the same index only.
     """
-    images = np.empty((len(sequence), *sources.shape))
-    latest = sources
-    for bounce, mirror in enumerate(sequence):
-        images[bounce] = latest = mirrors.images(latest, mirror)
+    images = _images(mirrors, sequence, sources)
     ends = receivers if receiver_offsets is None else receivers + receiver_offsets
     return _trace(
         mirrors,
@@ -150,6 +154,17 @@ def trace_chain(
         paired=paired,
         slabs=slabs,
     )
+
+
+def _images(
+    mirrors: Mirrors, sequence: tuple[int, ...], sources: Float[np.ndarray, "sources 3"]
+) -> Float[np.ndarray, "bounces sources 3"]:
+    """Mirror sources in one mirror after the other."""
+    images = np.empty((len(sequence), *sources.shape))
+    latest = sources
+    for bounce, mirror in enumerate(sequence):
+        images[bounce] = latest = mirrors.images(latest, mirror)
+    return images
 
 
 def unfolded_chain(
@@ -221,6 +236,18 @@ def _sequences(
         for mirror in np.flatnonzero(within_reach(mirrors, sequence, latest)).tolist():
             image = mirrors.images(latest, mirror)
             stack.append(((*sequence, mirror), np.concatenate([images, image[None]])))
+
+
+def _given(
+    mirrors: Mirrors,
+    sources: Float[np.ndarray, "sources 3"],
+    among: Iterable[tuple[int, ...]],
+    max_bounces: int,
+) -> Iterator[tuple[tuple[int, ...], _Images]]:
+    """Give sequences that were found otherwise the images of the sources, and the direct one."""
+    for sequence in itertools.chain([()], among):
+        if len(sequence) <= max_bounces:
+            yield sequence, _images(mirrors, sequence, sources)
 
 
 def within_reach(

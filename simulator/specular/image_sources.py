@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 from jaxtyping import Complex, Float
 
-from scenes.schema.errors import ScenarioError
 from simulator.antennas.antenna_pattern import AntennaPattern
 from simulator.antennas.beam_culling import LEVEL, AntennaGroup
 from simulator.antennas.links import Links
@@ -23,7 +22,8 @@ from simulator.specular.image_method import unfolded_chain
 from simulator.specular.path_field import Through, reflected_field
 
 MOST_LEGS = 10_000
-"""Most legs over mirrors: tracing one from every antenna takes some 10 ms; minutes in all. [-]"""
+"""Most legs over mirrors that are listed without a test of what antennas see: tracing one from
+every antenna takes some 10 ms; minutes in all. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +72,7 @@ DIRECT = Leg(sequence=(), turn=np.eye(3), shift=np.zeros(3))
 
 def legs_within_reach(
     mirrors: Mirrors, groups: Sequence[AntennaGroup], most: int
-) -> tuple[Leg, ...]:
+) -> tuple[Leg, ...] | None:
     """Find the legs over 1 to ``most`` mirrors that lie within antennas' patterns.
 
     Parameters
@@ -86,12 +86,8 @@ def legs_within_reach(
 
     Returns
     -------
-    In the order of their mirrors, each leg before those that extend it.
-
-    Raises
-    ------
-    ScenarioError
-        If there are too many.
+    In the order of their mirrors, each leg before those that extend it; None if there are more
+    than :data:`MOST_LEGS`.
     """
     centres = mirrors.corners.mean(axis=1)
     radii = np.linalg.norm(mirrors.corners - centres[:, None], axis=-1).max(axis=1)
@@ -107,16 +103,12 @@ def legs_within_reach(
 
     found: list[Leg] = []
     longest = [DIRECT]
-    for bounces in range(1, most + 1):
+    for _ in range(most):
         longer: list[Leg] = []
         for leg in longest:
             longer += grown(leg)
             if len(found) + len(longer) > MOST_LEGS:
-                raise ScenarioError(
-                    f"max_bounces = {most}: the antennas reach more than {MOST_LEGS} ways over up "
-                    f"to {bounces} mirrors; set max_bounces = {bounces - 1}, or give the base "
-                    "station a narrower antenna"
-                )
+                return None
         found, longest = found + longer, longer
     return tuple(sorted(found, key=lambda leg: leg.sequence))
 

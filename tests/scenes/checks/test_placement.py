@@ -297,7 +297,7 @@ def test_facets_that_would_not_fit_into_memory_are_refused_at_once() -> None:
 
 def test_many_objects_together_must_fit_into_memory() -> None:
     def walls(count: int) -> Table:  # each 8.4e7 triangles of 0.254 mm: 10 GiB
-        wall = plate(height_m=1.35, length_m=2.0)
+        wall = plate(height_m=1.35, length_m=2.0, roughness=rough(0.05, 5.0))
         return {str(n): wall | {"centre_m": [0, 1.0 + n, 0]} for n in range(count)}
 
     scene(walls(1))

@@ -305,7 +305,7 @@ def test_a_mesh_of_too_many_facets_is_refused(tmp_path: Path) -> None:
     file = saved(tmp_path, cube(20.0))
     refused(
         r"^objects\.it: needs .* facets at a spacing of 1\.25 mm",
-        mesh_table(file, centre_m=[0, 50]),
+        mesh_table(file, centre_m=[0, 50], roughness={"rms_mm": 0.1, "correlation_mm": 10.0}),
     )
     body = scene(mesh_table(saved(tmp_path, cube(), "small.ply")))
     with pytest.raises(ScenarioError, match=r"facets at a spacing of 0\.0001 mm"):

@@ -9,6 +9,7 @@ from scipy.constants import speed_of_light
 
 from scenes.scenario import Scenario, ScenarioError, parse_scenario
 from simulator.multibounce import chain_count
+from simulator.scene import scene_mirrors
 from simulator.scene.scenario_paths import scenario_paths
 from simulator.simulation import Simulation, simulate
 from simulator.specular import image_sources
@@ -171,6 +172,7 @@ def test_more_ways_over_mirrors_in_space_than_can_be_traced_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(image_sources, "MOST_LEGS", 5)
+    monkeypatch.setattr(scene_mirrors, "MOST_LAUNCHED", 5)
     wall = {"kind": "plate", "material": "metal", "angle_deg": 90.0, "length_m": 0.2,
             "height_m": 0.2}  # fmt: skip
     scene = parse_scenario(

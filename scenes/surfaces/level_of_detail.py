@@ -1,0 +1,41 @@
+"""Which bodies reflect as mirrors of flat faces where cutting them into facets would be waste.
+
+A smooth flat face needs no facets for its reflection: the image of an antenna behind it gives the
+same field wherever the face is much larger than a Fresnel zone. Facets are needed where a surface
+is rough, curved, or small.
+"""
+
+import numpy as np
+
+from scenes.meshes.mesh_file import placed_mesh
+from scenes.schema.objects import Body, Box, MeshFile, Plate
+from scenes.surfaces.mesh_refinement import flat_patches
+
+LEAST_FACE = 10.0
+"""Mean width of a mesh's flat faces, over the wavelength, above which they count as flat walls and
+not as the approximation of something round: the first Fresnel zone of a link is that wide at a
+hundred wavelengths, a metre at 30 GHz. Chosen. [-]"""
+
+
+def flat_and_smooth(body: Body, wavelength: float) -> bool:
+    """Return whether a body of a 3-D scene consists of smooth flat faces.
+
+    Parameters
+    ----------
+    body
+        The object. A cylinder is curved; a mesh whose facets are taken as they are may hold
+        roughness, and so does a realisation.
+    wavelength
+        The longest of the band. [m]
+    """
+    if body.frozen is not None or (body.roughness is not None and body.roughness.rms > 0):
+        return False
+    match body:
+        case Plate() | Box():
+            return True
+        case MeshFile(facets="cut"):
+            mesh = placed_mesh(body)
+            faces = int(flat_patches(mesh).max()) + 1
+            return bool(np.sqrt(mesh.area / faces) >= LEAST_FACE * wavelength)
+        case _:
+            return False
