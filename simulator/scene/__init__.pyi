@@ -1,4 +1,5 @@
 from .array_antennas import array_group, in_space, sending_group, user_group
+from .level_of_detail import mirrored_bodies
 from .radio_scene import RadioScene, antenna_pattern, facet_ports, scenario_materials, true_elements
 from .scenario_paths import ScenarioPath
 from .scene_mirrors import SceneMirrors
@@ -12,6 +13,7 @@ __all__ = [
     "array_group",
     "facet_ports",
     "in_space",
+    "mirrored_bodies",
     "scenario_materials",
     "scenario_truth",
     "sending_group",
