@@ -110,10 +110,11 @@ def _refuse_what_cannot_be_located(scenario: Scenario) -> None:
         )
     along, up = scenario.base_station.shape
     if along < 2:
+        given = along if isinstance(scenario.base_station.elements, int) else [along, up]
         raise ScenarioError(
-            f"base_station.elements: {along} × {up}; mirrors and users are located with a linear "
-            "array of at least 2 elements, or a planar one of at least 2 × 2. `mmslam simulate` "
-            "takes any array"
+            f"base_station.elements = {given}: mirrors and users are located with a linear array "
+            "of at least 2 elements, or a planar one of at least 2 × 2; give more elements. "
+            "`mmslam simulate` takes any array"
         )
     if up > 1 and scenario.base_station.transmit_offset is not None:
         raise ScenarioError(

@@ -155,7 +155,17 @@ class AngleRangeMap(_Shown, plain.AngleRangeMap):
 
 
 class Users(tuple[User, ...]):
-    """The users in the order of the measurement, also by name: ``estimate.users["ann"]``."""
+    """The users in the order of the measurement, also by name: ``estimate.users["ann"]``.
+
+    As a tuple it iterates over users; :meth:`keys`, :meth:`values` and :meth:`items` are those of a
+    mapping from names to users, so that ``dict(estimate.users)`` is that mapping.
+
+    Examples
+    --------
+    >>> users = Users([User(name="ann", status="not_found")])
+    >>> "ann" in users, list(users.keys()), [user.status for name, user in users.items()]
+    (True, ['ann'], ['not_found'])
+    """
 
     @overload
     def __getitem__(self, key: SupportsIndex | str, /) -> User: ...
@@ -178,10 +188,26 @@ class Users(tuple[User, ...]):
                 return user
         raise KeyError(f"no user {key!r}; there are {', '.join(self.names) or 'none'}")
 
+    def __contains__(self, key: object, /) -> bool:
+        """Return whether there is a user of this name, or this user."""
+        return key in self.names if isinstance(key, str) else any(user is key for user in self)
+
     @property
     def names(self) -> tuple[str, ...]:
         """The users' names."""
         return tuple(user.name for user in self)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the users' names, in order."""
+        return self.names
+
+    def values(self) -> tuple[User, ...]:
+        """Return the users, in order."""
+        return tuple(self)
+
+    def items(self) -> tuple[tuple[str, User], ...]:
+        """Return pairs of name and user, in order."""
+        return tuple((user.name, user) for user in self)
 
     def __repr__(self) -> str:
         """Show them as a table."""

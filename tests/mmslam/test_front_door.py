@@ -54,6 +54,11 @@ def test_the_user_behind_the_mirror_is_found_and_asked_for_by_name(
     assert error < 4 * user.uncertainty_m  # beyond it, one normal draw in 16 000
     with pytest.raises(KeyError, match="no user 'bob'; there are user"):
         estimate.users["bob"]
+    assert list(estimate.users.keys()) == ["user"]
+    assert dict(estimate.users.items()) == dict(estimate.users) == {"user": user}
+    assert ("user" in estimate.users, "bob" in estimate.users) == (True, False)
+    assert estimate.users.values() == (user,)
+    assert user in estimate.users
 
 
 def test_the_estimator_is_handed_the_measurement_proper_and_no_truth(

@@ -16,6 +16,9 @@ from typer.testing import CliRunner
 
 from mmslam import own_results
 from mmslam.cli import app
+from mmslam.pipeline import run_scenario
+from scenes.files.loading import load_scenario
+from scenes.schema.errors import ScenarioError
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 SMALL = [
@@ -157,3 +160,13 @@ def test_ctrl_c_in_the_middle_of_a_run_leaves_nothing_behind(tmp_path: Path) -> 
     assert printed == ""
     assert errors == "mmslam: interrupted; nothing was written\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("elements", "told"), [("1", "1"), ("[1, 4]", r"\[1, 4\]")])
+def test_an_array_too_small_to_locate_is_refused_before_work_as_it_was_given(
+    tmp_path: Path, elements: str, told: str
+) -> None:
+    scenario = load_scenario("bench_3d", [f"base_station.elements={elements}"])
+    with pytest.raises(ScenarioError, match=rf"base_station\.elements = {told}: .*give more"):
+        run_scenario(scenario, seed=0, folder=tmp_path / "out")
+    assert not any(tmp_path.iterdir())

@@ -1,16 +1,14 @@
 """What a bench adds to a point's echo is proposed to be taken out, and is taken out by its key."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, MeasurementError
-from mmslam.formats.import_measured import Import, import_measured
-from mmslam.formats.mapping import load_mapping
+from mmslam.formats.import_measured import Import
 
-TARGET = np.array([0.013, 0.21, -0.008])  # [m]
 FREQUENCIES = np.linspace(30e9, 34e9, 21)  # [Hz]
 FREQUENCY = 'frequency = { start = 30.0, stop = 34.0, points = 21, unit = "GHz" }\n'
 LINE = 'positions = { first = [-9.0, 0.0, -4.0], step = [4.0, 0.0, 0.0], unit = "mm" }\n'
@@ -26,25 +24,11 @@ def line() -> np.ndarray:
     return plane()[:5]
 
 
-def echo_of(positions: np.ndarray, frequencies: np.ndarray = FREQUENCIES) -> np.ndarray:
-    """The echo of one point of unit strength."""
-    distance = np.linalg.norm(positions - TARGET, axis=1)[:, None]
-    return np.asarray(0.1 * np.exp(-4j * np.pi * frequencies * distance / speed_of_light))
-
-
-def take(folder: Path, name: str, mapping: str) -> Import:
-    (folder / "mapping.toml").write_text(mapping, encoding="utf-8")
-    return import_measured(folder / name, load_mapping(folder / "mapping.toml"), base=folder)
-
-
-def taken(folder: Path, name: str, mapping: str) -> Echo:
-    echo = take(folder, name, mapping).measurement.echo
-    assert echo is not None
-    return echo
-
-
 def test_a_constant_that_covers_the_scene_is_proposed_to_be_subtracted_and_is(
     tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
 ) -> None:
     leak = np.exp(-2j * np.pi * FREQUENCIES * 0.3e-9) * (0.7 + 0.3 * np.cos(FREQUENCIES / 3e8))
     np.savez(tmp_path / "s.npz", s=0.01 * echo_of(plane()) + 0.1 * leak, p=plane())
@@ -65,7 +49,9 @@ def test_a_constant_that_covers_the_scene_is_proposed_to_be_subtracted_and_is(
         take(tmp_path, "s.npz", mapping + "gate_out_ns = [0.9, 0.5]\n")
 
 
-def test_in_a_medium_lengths_come_out_by_its_refractive_index(tmp_path: Path) -> None:
+def test_in_a_medium_lengths_come_out_by_its_refractive_index(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], echo_of: Callable[..., np.ndarray]
+) -> None:
     slow = echo_of(line(), 1.5 * FREQUENCIES)  # every path is 1.5 times as long
     np.savez(tmp_path / "s.npz", s=slow)
     mapping = "refractive_index = 1.5\n" + FREQUENCY + LINE + 'echo = { variable = "s" }'
@@ -80,7 +66,9 @@ WIDE = np.stack([5e-3 * (np.arange(31) - 15), np.zeros(31), np.zeros(31)], axis=
 DELAYED = FREQUENCY + 'positions = { variable = "p", unit = "m" }\n[echo]\nvariable = "s"\n'
 
 
-def test_a_cables_delay_is_remarked_by_the_focus_and_taken_out_on_request(tmp_path: Path) -> None:
+def test_a_cables_delay_is_remarked_by_the_focus_and_taken_out_on_request(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], echo_of: Callable[..., np.ndarray]
+) -> None:
     late = np.exp(-2j * np.pi * FREQUENCIES * 0.4e-9)
     np.savez(tmp_path / "s.npz", s=echo_of(WIDE) * late, p=WIDE)
     (note,) = take(tmp_path, "s.npz", DELAYED).notes
@@ -95,14 +83,18 @@ def test_a_cables_delay_is_remarked_by_the_focus_and_taken_out_on_request(tmp_pa
     assert np.ptp(np.unwrap(np.angle(turn.mean(axis=0)))) < 0.01
 
 
-def test_samples_of_the_other_sign_are_told_by_their_converging_wave(tmp_path: Path) -> None:
+def test_samples_of_the_other_sign_are_told_by_their_converging_wave(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], echo_of: Callable[..., np.ndarray]
+) -> None:
     np.savez(tmp_path / "s.npz", s=echo_of(WIDE).conj(), p=WIDE)
     notes = take(tmp_path, "s.npz", DELAYED).notes
     assert any("converges" in note and "time_convention" in note for note in notes)
     assert not take(tmp_path, "s.npz", 'time_convention = "exp(-jwt)"\n' + DELAYED).notes
 
 
-def test_a_delay_that_no_focus_tells_is_refused_with_the_remedy(tmp_path: Path) -> None:
+def test_a_delay_that_no_focus_tells_is_refused_with_the_remedy(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], echo_of: Callable[..., np.ndarray]
+) -> None:
     rng = np.random.default_rng(5)
     noise = rng.normal(size=(31, 21)) + 1j * rng.normal(size=(31, 21))
     np.savez(tmp_path / "s.npz", s=0.1 * noise, p=WIDE)

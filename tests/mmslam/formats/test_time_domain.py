@@ -1,6 +1,7 @@
 """Traces over time, beats of a chirp and recorders' files give the sweep of one point's echo."""
 
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py  # type: ignore[import-untyped]
@@ -9,8 +10,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, MeasurementError
-from mmslam.formats.import_measured import Import, import_measured
-from mmslam.formats.mapping import load_mapping
+from mmslam.formats.import_measured import Import
 
 TARGET = np.array([0.02, 0.35, 0.0])  # [m]
 PLACES = np.stack([8e-3 * np.arange(9) - 0.032, np.zeros(9), np.zeros(9)], axis=1)  # [m]
@@ -19,17 +19,6 @@ LINE = 'positions = { first = [-32.0, 0.0, 0.0], step = [8.0, 0.0, 0.0], unit = 
 
 CARRIER, WIDTH = 6e9, 0.25e-9
 """A Gaussian pulse exp(−t²/2w²) about a carrier: its spectrum is w√2π exp(−(2πw(f−f₀))²/2)."""
-
-
-def take(folder: Path, name: str, mapping: str) -> Import:
-    (folder / "mapping.toml").write_text(mapping, encoding="utf-8")
-    return import_measured(folder / name, load_mapping(folder / "mapping.toml"), base=folder)
-
-
-def taken(folder: Path, name: str, mapping: str) -> Echo:
-    echo = take(folder, name, mapping).measurement.echo
-    assert echo is not None
-    return echo
 
 
 def turned_back(echo: Echo, delay: np.ndarray = DELAY) -> np.ndarray:
@@ -44,7 +33,7 @@ def pulse(times: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("way", ["variable", "step", "columns"])
 def test_the_spectrum_of_a_pulse_is_its_closed_form_and_delayed_by_the_point(
-    tmp_path: Path, way: str
+    tmp_path: Path, way: str, taken: Callable[[Path, str, str], Echo]
 ) -> None:
     first, step = -1.5e-9, 20e-12
     times = first + step * np.arange(500)
@@ -77,7 +66,9 @@ def test_the_spectrum_of_a_pulse_is_its_closed_form_and_delayed_by_the_point(
     np.testing.assert_allclose(flat, np.broadcast_to(shape, flat.shape), atol=1e-6)
 
 
-def test_complex_traces_about_a_carrier_keep_their_phase(tmp_path: Path) -> None:
+def test_complex_traces_about_a_carrier_keep_their_phase(
+    tmp_path: Path, taken: Callable[[Path, str, str], Echo]
+) -> None:
     times = 40e-12 * np.arange(250)
     late = times - DELAY - 1e-9
     envelope = np.exp(-(late**2) / 2 / WIDTH**2)
@@ -93,7 +84,9 @@ def test_complex_traces_about_a_carrier_keep_their_phase(tmp_path: Path) -> None
                                atol=1e-5)  # fmt: skip
 
 
-def test_gprmax_and_gssi_files_tell_their_own_time_step(tmp_path: Path) -> None:
+def test_gprmax_and_gssi_files_tell_their_own_time_step(
+    tmp_path: Path, taken: Callable[[Path, str, str], Echo]
+) -> None:
     step, count = 20e-12, 512
     traces = pulse(step * np.arange(count) - DELAY - 1e-9)
     with h5py.File(tmp_path / "scan.out", "w") as file:
@@ -129,7 +122,9 @@ def write_dzt(path: Path, scans: np.ndarray, step: float) -> None:
 
 
 @pytest.mark.parametrize("damage", ["cut", "tag", "bits", "short", "range"])
-def test_a_damaged_gssi_file_is_told(tmp_path: Path, damage: str) -> None:
+def test_a_damaged_gssi_file_is_told(
+    tmp_path: Path, damage: str, take: Callable[[Path, str, str], Import]
+) -> None:
     path = tmp_path / "scan.dzt"
     write_dzt(path, np.full((9, 64), 32768, dtype="<u2"), 1e-10)
     content = bytearray(path.read_bytes())
@@ -170,7 +165,12 @@ def beats() -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("layout", ["IIQQ", "IQ", "axis", "mat"])
-def test_beats_of_a_radar_chip_become_the_sweep_of_the_point(tmp_path: Path, layout: str) -> None:
+def test_beats_of_a_radar_chip_become_the_sweep_of_the_point(
+    tmp_path: Path,
+    layout: str,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+) -> None:
     found, delay = beats()
     counts = np.round(8000 * found)
     sign = 'time_convention = "exp(-jwt)"\n' + CHIRP + NEAR
@@ -210,7 +210,11 @@ def test_beats_of_a_radar_chip_become_the_sweep_of_the_point(tmp_path: Path, lay
     assert np.abs(np.angle(flat[:, 20:-20])).max() < 2e-3
 
 
-def test_a_single_mixers_beat_becomes_its_analytic_signal(tmp_path: Path) -> None:
+def test_a_single_mixers_beat_becomes_its_analytic_signal(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+) -> None:
     found, delay = beats()
     np.save(tmp_path / "beats.npy", found.real)
     echo = taken(tmp_path, "beats.npy", CHIRP + NEAR + 'echo = { axes = ["position", "sample"] }')
@@ -245,7 +249,7 @@ def test_a_single_mixers_beat_becomes_its_analytic_signal(tmp_path: Path) -> Non
     ],
 )  # fmt: skip
 def test_a_mapping_of_traces_that_cannot_be_is_told(
-    tmp_path: Path, old: str, new: str, message: str
+    tmp_path: Path, old: str, new: str, message: str, take: Callable[[Path, str, str], Import]
 ) -> None:
     np.save(tmp_path / "t.npy", pulse(20e-12 * np.arange(500) - DELAY))
     mapping = 'time = { step = 20.0, unit = "ps", band_ghz = [5.2, 6.8] }\n' + LINE

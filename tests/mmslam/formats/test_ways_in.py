@@ -1,16 +1,14 @@
 """Layouts of other people's recorders: each gives one point's echo, or the reason why not."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, MeasurementError
-from mmslam.formats.import_measured import Import, import_measured
-from mmslam.formats.mapping import load_mapping
+from mmslam.formats.import_measured import Import
 
-TARGET = np.array([0.013, 0.21, -0.008])  # [m]
 FREQUENCIES = np.linspace(30e9, 34e9, 21)  # [Hz]
 X, Z = 1e-3 * np.array([-9.0, -5.0, -1.0, 3.0, 7.0]), 1e-3 * np.array([-4.0, 0.0, 4.0, 8.0])
 
@@ -26,34 +24,30 @@ def plane() -> np.ndarray:
     return np.stack([x.ravel(), 0 * x.ravel(), z.ravel()], axis=1)
 
 
-def echo_of(positions: np.ndarray, frequencies: np.ndarray = FREQUENCIES) -> np.ndarray:
-    """The echo of one point of unit strength."""
-    distance = np.linalg.norm(positions - TARGET, axis=1)[:, None]
-    return np.asarray(0.1 * np.exp(-4j * np.pi * frequencies * distance / speed_of_light))
+@pytest.fixture
+def assert_is_the_point(echo_of: Callable[..., np.ndarray]) -> Callable[..., None]:
+    """Compares an echo with that of the point."""
+
+    def compare(echo: Echo, *, tolerance: float = EXACT) -> None:
+        expected = echo_of(echo.positions, echo.frequencies)
+        np.testing.assert_allclose(echo.samples, expected, rtol=0, atol=0.1 * tolerance)
+
+    return compare
 
 
-def take(folder: Path, name: str, mapping: str) -> Import:
-    (folder / "mapping.toml").write_text(mapping, encoding="utf-8")
-    return import_measured(folder / name, load_mapping(folder / "mapping.toml"), base=folder)
-
-
-def taken(folder: Path, name: str, mapping: str) -> Echo:
-    echo = take(folder, name, mapping).measurement.echo
-    assert echo is not None
-    return echo
-
-
-def assert_is_the_point(echo: Echo, *, tolerance: float = EXACT) -> None:
-    expected = echo_of(echo.positions, echo.frequencies)
-    np.testing.assert_allclose(echo.samples, expected, rtol=0, atol=0.1 * tolerance)
-
-
-def grid() -> np.ndarray:
+@pytest.fixture
+def grid(echo_of: Callable[..., np.ndarray]) -> Callable[[], np.ndarray]:
     """Samples by z, x, frequency."""
-    return echo_of(plane()).reshape(4, 5, 21)
+    return lambda: echo_of(plane()).reshape(4, 5, 21)
 
 
-def test_first_and_step_reach_over_every_axis_of_a_grid(tmp_path: Path) -> None:
+def test_first_and_step_reach_over_every_axis_of_a_grid(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    grid: Callable[[], np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     np.save(tmp_path / "s.npy", grid().transpose(2, 1, 0))
     steps = 'positions = { first = [-9.0, 0.0, -4.0], step = [4.0, 0.0, 4.0], unit = "mm" }\n'
     order = 'echo = { axes = ["frequency", "x", "z"] }'
@@ -67,6 +61,10 @@ def test_first_and_step_reach_over_every_axis_of_a_grid(tmp_path: Path) -> None:
 
 def test_i_and_q_along_an_axis_are_taken_with_the_converters_zero_and_scale(
     tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    grid: Callable[[], np.ndarray],
+    assert_is_the_point: Callable[..., None],
 ) -> None:
     exact = grid()
     counts = np.stack([np.round(2048 + 15000 * exact.imag), np.round(2050 + 15000 * exact.real)])
@@ -84,7 +82,13 @@ def test_i_and_q_along_an_axis_are_taken_with_the_converters_zero_and_scale(
         take(tmp_path, "iq.npy", without)
 
 
-def test_several_arrays_in_one_npy_file_are_told_apart_by_number(tmp_path: Path) -> None:
+def test_several_arrays_in_one_npy_file_are_told_apart_by_number(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    grid: Callable[[], np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     with (tmp_path / "two.npy").open("wb") as stream:
         np.save(stream, grid().real)
         np.save(stream, grid().imag)
@@ -99,7 +103,9 @@ def test_several_arrays_in_one_npy_file_are_told_apart_by_number(tmp_path: Path)
         take(tmp_path, "two.npy", mapping.replace('"1"', '"2"'))
 
 
-def test_a_header_that_promises_more_than_the_file_holds_is_refused_unread(tmp_path: Path) -> None:
+def test_a_header_that_promises_more_than_the_file_holds_is_refused_unread(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], grid: Callable[[], np.ndarray]
+) -> None:
     np.save(tmp_path / "s.npy", grid())
     content = (tmp_path / "s.npy").read_bytes()
     (tmp_path / "s.npy").write_bytes(content[:-16])
@@ -112,7 +118,11 @@ def test_a_header_that_promises_more_than_the_file_holds_is_refused_unread(tmp_p
 
 @pytest.mark.parametrize("indexing", ["ij", "xy"])
 def test_meshes_of_coordinates_are_unfolded_in_the_order_of_the_samples(
-    tmp_path: Path, indexing: str
+    tmp_path: Path,
+    indexing: str,
+    taken: Callable[[Path, str, str], Echo],
+    grid: Callable[[], np.ndarray],
+    assert_is_the_point: Callable[..., None],
 ) -> None:
     if indexing == "ij":
         mesh_x, mesh_z = np.meshgrid(X, Z, indexing="ij")
@@ -128,7 +138,9 @@ def test_meshes_of_coordinates_are_unfolded_in_the_order_of_the_samples(
     assert_is_the_point(taken(tmp_path, "mesh.npz", mapping))
 
 
-def test_a_mesh_that_lies_across_the_samples_is_refused_with_the_order(tmp_path: Path) -> None:
+def test_a_mesh_that_lies_across_the_samples_is_refused_with_the_order(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], grid: Callable[[], np.ndarray]
+) -> None:
     line = X[:4]
     mesh_x, mesh_z = np.meshgrid(line, Z)  # square: shapes cannot tell
     np.savez(tmp_path / "mesh.npz", s=grid()[:, :4], mx=mesh_x, mz=mesh_z)
@@ -143,7 +155,13 @@ def test_a_mesh_that_lies_across_the_samples_is_refused_with_the_order(tmp_path:
 @pytest.mark.parametrize(
     "form", ['"x.npy"', '{ file = "x.npy" }', '{ file = "c.npz", variable = "x" }']
 )
-def test_coordinates_may_lie_in_files_of_their_own(tmp_path: Path, form: str) -> None:
+def test_coordinates_may_lie_in_files_of_their_own(
+    tmp_path: Path,
+    form: str,
+    taken: Callable[[Path, str, str], Echo],
+    grid: Callable[[], np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     np.save(tmp_path / "s.npy", grid())
     np.save(tmp_path / "x.npy", 1e3 * X)
     np.save(tmp_path / "z.npy", 1e3 * Z)
@@ -155,16 +173,18 @@ def test_coordinates_may_lie_in_files_of_their_own(tmp_path: Path, form: str) ->
     assert_is_the_point(taken(tmp_path, "s.npy", mapping))
 
 
-def write_csv_folder(folder: Path, scale: float) -> None:
-    (folder / "scan").mkdir()
+@pytest.fixture
+def csv_folder(tmp_path: Path, echo_of: Callable[..., np.ndarray]) -> None:
+    """Tables of positions 4 mm apart, whose names count steps."""
+    (tmp_path / "scan").mkdir()
     for z in (-1, 0, 1, 2):
         for x in (-2, -1, 0, 1):
-            place = np.array([[scale * x, 0.0, scale * z]])
+            place = np.array([[4e-3 * x, 0.0, 4e-3 * z]])
             rows = zip(FREQUENCIES / 1e9, echo_of(place)[0], strict=True)
             lines = ['"Freq [GHz]","re(S(Rx_p1,Tx_p1)) []","im(S(Rx_p1,Tx_p1)) []"']
             lines += [f"{f!r},{s.real!r},{s.imag!r}" for f, s in
                       ((float(f), complex(s)) for f, s in rows)]  # fmt: skip
-            (folder / "scan" / f"h_{x}_v_{z}.csv").write_text("\n".join(lines) + "\n")
+            (tmp_path / "scan" / f"h_{x}_v_{z}.csv").write_text("\n".join(lines) + "\n")
 
 
 FOLDER = """
@@ -176,10 +196,13 @@ imaginary = "im(S(Rx_p1,Tx_p1)) []"
 """
 
 
+@pytest.mark.usefixtures("csv_folder")
 def test_a_folder_of_quoted_tables_has_its_positions_in_the_names_times_a_step(
     tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    assert_is_the_point: Callable[..., None],
 ) -> None:
-    write_csv_folder(tmp_path, 4e-3)
     steps = "first = [0.0, 0.0, 0.0], step = [4.0, 0.0, 4.0], unit"
     echo = taken(tmp_path, "scan", FOLDER.replace('unit = "mm" }\n[', f'{steps} = "mm" }}\n['))
     assert len(echo.positions) == 16
@@ -193,8 +216,10 @@ def test_a_folder_of_quoted_tables_has_its_positions_in_the_names_times_a_step(
     assert_is_the_point(one)
 
 
-def test_numbers_in_file_names_that_count_steps_are_remarked_with_the_key(tmp_path: Path) -> None:
-    write_csv_folder(tmp_path, 4e-3)
+@pytest.mark.usefixtures("csv_folder")
+def test_numbers_in_file_names_that_count_steps_are_remarked_with_the_key(
+    tmp_path: Path, take: Callable[[Path, str, str], Import]
+) -> None:
     imported = take(tmp_path, "scan", FOLDER)
     assert imported.measurement.echo is not None
     assert len(imported.measurement.echo.positions) == 16
@@ -211,7 +236,13 @@ def test_numbers_in_file_names_that_count_steps_are_remarked_with_the_key(tmp_pa
     ],
 )
 def test_tables_of_several_programs_name_their_columns(
-    tmp_path: Path, header: str, delimiter: str, comma: bool
+    tmp_path: Path,
+    header: str,
+    delimiter: str,
+    comma: bool,
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
 ) -> None:
     places = plane()[:5]
     lines = [header]
@@ -230,7 +261,13 @@ def test_tables_of_several_programs_name_their_columns(
 
 
 @pytest.mark.parametrize("imaginary_unit", ["i", "j"])
-def test_a_plain_matrix_of_text_needs_no_names(tmp_path: Path, imaginary_unit: str) -> None:
+def test_a_plain_matrix_of_text_needs_no_names(
+    tmp_path: Path,
+    imaginary_unit: str,
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     samples = echo_of(plane()[:5]).T
     rows = (
         " ".join(f"{s.real:.17g}{s.imag:+.17g}{imaginary_unit}" for s in row) for row in samples
@@ -256,7 +293,12 @@ def line() -> np.ndarray:
     return plane()[:5]
 
 
-def test_falling_frequencies_are_turned_and_the_samples_with_them(tmp_path: Path) -> None:
+def test_falling_frequencies_are_turned_and_the_samples_with_them(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     np.savez(tmp_path / "s.npz", s=echo_of(line())[:, ::-1], f=FREQUENCIES[::-1])
     imported = take(
         tmp_path, "s.npz",
@@ -267,7 +309,13 @@ def test_falling_frequencies_are_turned_and_the_samples_with_them(tmp_path: Path
     assert any("the frequencies fall" in note for note in imported.notes)
 
 
-def test_a_band_is_cut_out_of_a_sweep(tmp_path: Path) -> None:
+def test_a_band_is_cut_out_of_a_sweep(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     np.savez(tmp_path / "s.npz", s=echo_of(line()))
     mapping = "band_ghz = [31.0, 32.4]\n" + FREQUENCY + LINE + 'echo = { variable = "s" }'
     echo = taken(tmp_path, "s.npz", mapping)
@@ -277,7 +325,13 @@ def test_a_band_is_cut_out_of_a_sweep(tmp_path: Path) -> None:
         take(tmp_path, "s.npz", mapping.replace("[31.0, 32.4]", "[36.0, 37.0]"))
 
 
-def test_positions_are_left_out_by_number_or_where_nothing_was_measured(tmp_path: Path) -> None:
+def test_positions_are_left_out_by_number_or_where_nothing_was_measured(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     places = np.stack([4e-3 * np.arange(12), np.zeros(12), np.zeros(12)], axis=1)
     samples = echo_of(places)
     samples[7] = np.nan
@@ -304,7 +358,12 @@ def test_positions_are_left_out_by_number_or_where_nothing_was_measured(tmp_path
         take(tmp_path, "s.npz", mapping + "leave_out = [2, 12]\n")
 
 
-def test_counts_of_a_converter_are_remarked_and_scaled_by_a_key(tmp_path: Path) -> None:
+def test_counts_of_a_converter_are_remarked_and_scaled_by_a_key(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     np.savez(tmp_path / "s.npz", s=4e7 * echo_of(line()))
     mapping = FREQUENCY + LINE + '[echo]\nvariable = "s"\n'
     assert any("scale" in note for note in take(tmp_path, "s.npz", mapping).notes)
@@ -314,7 +373,12 @@ def test_counts_of_a_converter_are_remarked_and_scaled_by_a_key(tmp_path: Path) 
     assert_is_the_point(scaled.measurement.echo)
 
 
-def test_a_sweep_below_a_gigahertz_is_remarked_and_imported(tmp_path: Path) -> None:
+def test_a_sweep_below_a_gigahertz_is_remarked_and_imported(
+    tmp_path: Path,
+    take: Callable[[Path, str, str], Import],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
     low = np.linspace(0.4e9, 0.9e9, 21)
     places = np.stack([0.1 * np.arange(9), np.zeros(9), np.zeros(9)], axis=1)
     np.savez(tmp_path / "s.npz", s=echo_of(places, low), p=places, f=low)
@@ -333,7 +397,10 @@ def test_a_sweep_below_a_gigahertz_is_remarked_and_imported(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("kind", ["logarithmic", "segmented"])
 def test_unequal_frequencies_are_resampled_within_the_error_that_is_stated(
-    tmp_path: Path, kind: str
+    tmp_path: Path,
+    kind: str,
+    take: Callable[[Path, str, str], Import],
+    echo_of: Callable[..., np.ndarray],
 ) -> None:
     if kind == "logarithmic":
         found = np.geomspace(28e9, 36e9, 161)
@@ -355,7 +422,9 @@ def test_unequal_frequencies_are_resampled_within_the_error_that_is_stated(
         take(tmp_path, "s.npz", "frequency_rounded_to_hz = 3e7\n" + mapping)
 
 
-def test_steps_that_are_too_unequal_are_refused_with_the_remedy(tmp_path: Path) -> None:
+def test_steps_that_are_too_unequal_are_refused_with_the_remedy(
+    tmp_path: Path, take: Callable[[Path, str, str], Import], echo_of: Callable[..., np.ndarray]
+) -> None:
     rng = np.random.default_rng(4)
     found = np.sort(rng.uniform(28e9, 36e9, 2100))
     np.savez(tmp_path / "s.npz", s=echo_of(line(), found), f=found)
@@ -366,7 +435,10 @@ def test_steps_that_are_too_unequal_are_refused_with_the_remedy(tmp_path: Path) 
 
 @pytest.mark.parametrize("axes", ["xy", "xz", "circle"])
 def test_a_scan_over_x_and_y_looks_along_z_and_a_circle_keeps_its_boresight(
-    tmp_path: Path, axes: str
+    tmp_path: Path,
+    axes: str,
+    take: Callable[[Path, str, str], Import],
+    echo_of: Callable[..., np.ndarray],
 ) -> None:
     places = plane()
     if axes == "xy":
