@@ -1,22 +1,25 @@
-"""What the estimator's thresholds do, measured on draws of noise, speckle, and rough walls.
+"""Measurements of the estimator's thresholds on draws of noise, speckle, rough walls and rooms.
 
-Run as ``python -m validation.experiments.thresholds [chance|walls|scans] [DRAWS]``.
+Run as ``python -m validation.experiments.thresholds [chance|walls|scans|answers] [DRAWS]``.
 
-Not in the thesis, whose walls are marked by hand. Three tables:
+Not in the thesis, whose walls are marked by hand. Four tables:
 
-- ``chance``: what noise and strewn peaks do to the false-alarm rates and to the searches
+- ``chance``: false-alarm rates and false detections by noise and random peaks
   (:mod:`validation.trials.chance_finds`);
-- ``walls``: what true walls show of what thresholds bound, in closed form and simulated
+- ``walls``: the statistics of true walls that thresholds bound, in closed form and simulated
   (:mod:`validation.trials.wall_statistics`);
 - ``scans``: walls found, false walls, and the error of the walls' angle, as one constant at a time
-  is changed to the values beside its own. A constant whose neighbours give the same needs no finer
-  choice; where one loses walls or makes false ones, that is its reason.
+  is changed to neighbouring values. If neighbours give the same result, the constant needs no
+  finer choice; if one loses walls or adds false ones, this justifies the constant;
+- ``answers``: the same for users, walls and targets of whole estimates in simulated rooms
+  (:mod:`validation.trials.room_answers`), with :data:`ROOM_SEEDS` realisations of each.
 
-Claims that are asserted: each threshold does what its docstring says, within the limits in the
-table; and no scan's own value finds fewer walls, or more false ones, than a value beside it.
+Claims that are asserted: each threshold does what its docstring states, within the limits in the
+table; and no scan's own value gives fewer right answers, or more false ones, than a neighbour.
 """
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +29,16 @@ from validation.harness.claim import Row
 from validation.harness.row_table import conclude
 from validation.trials.chance_finds import chance_rows
 from validation.trials.drawn_echoes import Kind
+from validation.trials.room_answers import (
+    BODIES,
+    DIFFUSE,
+    PATHS,
+    WALLS_IN_WALLS,
+    Answers,
+    SimulatedRoom,
+    answers,
+    simulated_room,
+)
 from validation.trials.wall_statistics import (
     WALLS,
     Detection,
@@ -40,19 +53,23 @@ from validation.trials.wall_statistics import (
     wall_statistics,
 )
 
+TABLES = ("chance", "walls", "scans", "answers")
 DRAWS = 12
 """Walls of each family. [-]"""
+ROOM_SEEDS = 1
+"""Realisations of each room: every one is located with all values of a constant. [-]"""
 SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
 """Echoes on which constants are scanned, besides one simulated wall of each family. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scan:
-    """A constant, and the values beside its own."""
+    """A constant, the neighbouring values, and for whole answers the rooms."""
 
     module: str
     name: str
     values: tuple[float, float]
+    rooms: tuple[str, ...] = ()  # keys of :data:`validation.trials.trap_rooms.TRAPS`
 
 
 SCANS = (
@@ -78,9 +95,22 @@ SCANS = (
     Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
 )
 
+ANSWER_SCANS = (
+    Scan(module="estimator.channel.path", name="LEAST_SHARE", values=(0.025, 0.1), rooms=PATHS),
+    Scan(module="estimator.channel.path", name="CURVATURE_SLACK", values=(0.05, 0.2), rooms=PATHS),
+    Scan(module="estimator.mapping.wall_unfolding", name="SAME_PLACE", values=(1.5, 6.0),
+         rooms=WALLS_IN_WALLS),
+    Scan(module="estimator.mapping.target_detection", name="WIDE", values=(1.0, 4.0),
+         rooms=BODIES),
+    Scan(module="estimator.positioning.diffuse_positioning", name="RIVAL", values=(0.8, 0.95),
+         rooms=DIFFUSE),
+)  # fmt: skip
+"""Constants that decide on paths, positions and targets, with half and twice their value; of a
+share near 1, with half and twice its distance from 1."""
+
 
 def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
-    """Compare what the walls of one family show with the thresholds that bound it.
+    """Compare the statistics of the walls of one family with the thresholds that bound them.
 
     Parameters
     ----------
@@ -140,7 +170,7 @@ def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
 
 
 def overlap_rows(echoes: tuple[Surveyed, ...], *, draws: int = 400) -> list[Row]:
-    """Compare the overlap of crossing walls, and of two fits of one wall, with what tells them."""
+    """Compare the overlaps of crossing walls and of two fits of one wall with the threshold."""
     crossing = crossing_overlap(np.random.default_rng(0), draws=draws)
     one_wall = [followed_overlap(one) for one in echoes if one.drawn.kind == "wall"]
     return [
@@ -162,7 +192,7 @@ def overlap_rows(echoes: tuple[Surveyed, ...], *, draws: int = 400) -> list[Row]
 
 
 def scan(one: Scan, echoes: tuple[Surveyed, ...]) -> dict[float, Detection]:
-    """Detect the walls of echoes with a constant's own value and with those beside it."""
+    """Detect the walls of echoes with a constant's own value and with the neighbouring ones."""
     own = getattr(sys.modules[one.module], one.name)
     results = {}
     for value in sorted({own, *one.values}):
@@ -172,7 +202,7 @@ def scan(one: Scan, echoes: tuple[Surveyed, ...]) -> dict[float, Detection]:
 
 
 def scan_line(one: Scan, results: dict[float, Detection]) -> str:
-    """Describe a scan in a line; the constant's own value is in brackets."""
+    """Return the line of a scan; the constant's own value is in brackets."""
     own = getattr(sys.modules[one.module], one.name)
     parts = []
     for value, result in results.items():
@@ -185,7 +215,7 @@ def scan_line(one: Scan, results: dict[float, Detection]) -> str:
 
 
 def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
-    """Tell by how many walls the constant's own value falls behind the best one beside it."""
+    """Return by how many walls the constant's own value is behind the best neighbour."""
     own = getattr(sys.modules[one.module], one.name)
     merit = {value: result.found - result.false for value, result in results.items()}
     return Row(
@@ -197,9 +227,47 @@ def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
     )
 
 
+def answer_scan(one: Scan, rooms: Sequence[SimulatedRoom]) -> dict[float, Answers]:
+    """Locate the users of rooms with a constant's own value and with the neighbouring ones."""
+    own = getattr(sys.modules[one.module], one.name)
+    results = {}
+    for value in sorted({own, *one.values}):
+        with changed(one.module, one.name, value):
+            results[value] = answers(rooms)
+    return results
+
+
+def answer_line(one: Scan, results: dict[float, Answers]) -> str:
+    """Return the line of a scan of answers; the constant's own value is in brackets."""
+    own = getattr(sys.modules[one.module], one.name)
+    parts = []
+    for value, result in results.items():
+        label = f"[{value:g}]" if value == own else f"{value:g}"
+        parts.append(
+            f"{label}: users {result.right} right, {result.wrong} wrong "
+            f"({1e3 * result.median_error:.3f} mm), walls {result.walls}, "
+            f"{result.false_walls} false, targets {result.targets}, {result.false_targets} false"
+        )
+    return f"{one.module.removeprefix('estimator.')}.{one.name}: " + "; ".join(parts)
+
+
+def answer_row(one: Scan, results: dict[float, Answers]) -> Row:
+    """Return by how many answers the constant's own value is behind the best neighbour."""
+    own = getattr(sys.modules[one.module], one.name)
+    best = max(result.merit for result in results.values())
+    module = one.module.removeprefix("estimator.")
+    return Row(
+        name=f"{module}.{one.name}: right less false answers, behind",
+        stated="none of its neighbours is better by more than one answer",
+        measured=float(best - results[own].merit),
+        high=1.0,
+        origin="one answer of the draws: the scatter of a count",
+    )
+
+
 def main(arguments: list[str]) -> None:
-    """Print the tables that are asked for; fail where a threshold does not do what it says."""
-    wanted = [one for one in arguments if not one.isdigit()] or ["chance", "walls", "scans"]
+    """Print the requested tables; fail if a threshold does not do what its docstring states."""
+    wanted = [one for one in arguments if not one.isdigit()] or list(TABLES)
     draws = next((int(one) for one in arguments if one.isdigit()), DRAWS)
     rows: list[Row] = []
     if "chance" in wanted:
@@ -221,6 +289,16 @@ def main(arguments: list[str]) -> None:
             results = scan(one, echoes)
             print(scan_line(one, results), flush=True)
             rows.append(scan_row(one, results))
+    if "answers" in wanted:
+        simulated: dict[tuple[str, int], SimulatedRoom] = {}
+        for one in ANSWER_SCANS:
+            keys = [(name, seed) for name in one.rooms for seed in range(ROOM_SEEDS)]
+            for key in keys:
+                if key not in simulated:
+                    simulated[key] = simulated_room(*key)
+            told = answer_scan(one, [simulated[key] for key in keys])
+            print(answer_line(one, told), flush=True)
+            rows.append(answer_row(one, told))
     conclude(rows)
 
 

@@ -21,6 +21,7 @@ from jaxtyping import Float
 from scipy.optimize import linear_sum_assignment
 
 from estimator.results.estimate import Mirror, Target
+from validation.metrics.errors import distances_from_segment
 from validation.metrics.truth import Truth, front_face
 
 
@@ -160,3 +161,21 @@ def compare_targets(
         missed=tuple(names[index] for index in found.missed),
         ospa=found.ospa,
     )
+
+
+def target_distances(
+    targets: Sequence[Target], truth: Truth
+) -> tuple[Float[np.ndarray, " targets"], Float[np.ndarray, " targets"]]:
+    """Return the distances of targets from the nearest wall or body, and from walls alone. [m]."""
+    places = np.array([one.position for one in targets]).reshape(-1, 3)
+    walls = [
+        distances_from_segment(places, truth.wall_start[name], truth.wall_end[name])
+        for name in truth.wall_start
+    ]
+    bodies = [
+        np.array([np.linalg.norm(place - front_face(truth, name, place)) for place in places])
+        for name in truth.target_position
+    ]
+    nothing = np.full(len(places), np.inf)
+    on_walls = np.min([nothing, *walls], axis=0)
+    return np.min([on_walls, *bodies], axis=0), on_walls

@@ -1,14 +1,25 @@
 """The estimator's thresholds do what they say, on few draws; the full tables have many."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.walls import line_relations
-from validation.experiments.thresholds import SCANS, Scan, overlap_rows, scan, scan_row, wall_rows
+from validation.experiments.thresholds import (
+    ANSWER_SCANS,
+    SCANS,
+    Scan,
+    answer_row,
+    overlap_rows,
+    scan,
+    scan_row,
+    wall_rows,
+)
 from validation.trials import chance_finds
 from validation.trials.drawn_echoes import draw_echo
+from validation.trials.room_answers import answers, simulated_room
 from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
 
 
@@ -64,12 +75,25 @@ def test_a_constant_is_changed_wherever_it_is_imported() -> None:
     assert vars(user)["BEYOND_END"] == own
 
 
-@pytest.mark.parametrize("one", SCANS, ids=lambda one: one.name)
+@pytest.mark.parametrize("one", [*SCANS, *ANSWER_SCANS], ids=lambda one: one.name)
 def test_each_scan_is_of_a_constant_that_exists_between_the_values_tried(one: Scan) -> None:
     low, high = one.values
     module = importlib.import_module(one.module)
     own = getattr(module, one.name)
     assert low < own < high
+
+
+def test_a_user_in_sight_is_a_right_answer_and_is_lost_where_no_path_may_count() -> None:
+    room = simulated_room("in sight beside it", 0)
+    seen = answers([room])
+    assert (seen.right, seen.wrong, seen.false_targets) == (1, 0, 0)
+    (one,) = (one for one in ANSWER_SCANS if one.name == "LEAST_SHARE")
+    with changed(one.module, one.name, 2.0):
+        lost = answers([room])
+    assert (lost.right, lost.walls) == (0, seen.walls)
+    own = getattr(importlib.import_module(one.module), one.name)
+    assert answer_row(one, {own: seen, 2.0: lost}).measured == 0
+    assert not answer_row(one, {own: lost, 2.0: replace(seen, right=3)}).passed
 
 
 @pytest.mark.slow

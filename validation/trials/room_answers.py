@@ -1,0 +1,108 @@
+"""Whole answers to simulated rooms against the truth, as one constant of the estimator changes.
+
+The rooms are those of :mod:`validation.trials.trap_rooms`, which are small. Each group of constants
+has its own ones, in which their decisions occur.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from estimator.localization.pipeline import locate
+from estimator.measurement.model import Measurement
+from scenes.files.loading import load_scenario
+from simulator.simulation import simulate
+from validation.metrics.coverage import position_errors
+from validation.metrics.mirror_check import seen_mirrors
+from validation.metrics.target_association import target_distances
+from validation.metrics.truth import Truth, truth_from_dataset
+from validation.trials.trap_rooms import TRAPS
+
+REGION = float(chi2.ppf(0.999, 2))
+"""Normalised square of an error beyond which a position that is called found is wrong. [-]"""
+AT_SOMETHING = 0.02
+"""Distance from every wall and body above which a target is false: three cells λ/2D at 0.8 m.
+[m]"""
+
+WALLS_IN_WALLS = ("corner, in sight", "parallel, over both", "short second wall, 14 cm")
+"""Rooms whose walls are seen over each other."""
+BODIES = ("post before the wall", "post beside a sight line", "convex mirror", "corner, in sight")
+"""Rooms with posts, a column, and the ends of walls."""
+PATHS = (
+    "plain",
+    "in sight and over it",
+    "convex mirror",
+    "unknown clock, two paths",
+    "smooth wall, its ends in sight",
+    "behind, past an end",
+    "post before the wall",
+)
+"""Rooms whose pilots come over a wall, in line of sight, and from edges and curved bodies."""
+DIFFUSE = ("wall turned away", "wall turned far away")
+"""Rooms whose pilots come by diffuse scattering."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedRoom:
+    """One realisation of a room, with its truth."""
+
+    measurement: Measurement
+    truth: Truth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answers:
+    """Counts of right and wrong answers to several rooms of one user each."""
+
+    right: int  # users found whose region holds the truth
+    wrong: int  # users found whose region does not
+    median_error: float  # of users found; NaN without any [m]
+    walls: int  # true walls on which a mirror was reported
+    false_walls: int  # mirrors reported on no wall
+    targets: int  # reported
+    false_targets: int  # reported where nothing is
+
+    @property
+    def merit(self) -> int:
+        """Right answers less wrong ones; targets count by false ones only. [-]."""
+        return self.right - self.wrong + self.walls - self.false_walls - self.false_targets
+
+
+def simulated_room(name: str, seed: int) -> SimulatedRoom:
+    """Simulate one realisation of a trap room."""
+    scenario, overrides = TRAPS[name]
+    simulation = simulate(load_scenario(scenario, overrides), seed=seed)
+    return SimulatedRoom(
+        measurement=simulation.measurement, truth=truth_from_dataset(simulation.truth)
+    )
+
+
+def answers(rooms: Sequence[SimulatedRoom]) -> Answers:
+    """Locate the users of rooms, and count what is right and what is wrong."""
+    errors: list[float] = []
+    right = wrong = walls = false_walls = targets = false_targets = 0
+    for room in rooms:
+        estimate = locate(room.measurement, images=False)
+        (user,) = estimate.users
+        error, square = position_errors(user, room.truth.user_position[user.name])
+        if user.status == "found" and error is not None:
+            errors.append(error)
+            inside = square is not None and square < REGION
+            right, wrong = right + inside, wrong + (not inside)
+        mirrors = seen_mirrors(estimate, room.truth)
+        walls += len({one.wall for one in mirrors} - {None})
+        false_walls += sum(one.wall is None for one in mirrors)
+        targets += len(estimate.targets)
+        away = target_distances(estimate.targets, room.truth)[0]
+        false_targets += int(np.sum(away > AT_SOMETHING))
+    return Answers(
+        right=right,
+        wrong=wrong,
+        median_error=float(np.median(errors)) if errors else np.nan,
+        walls=walls,
+        false_walls=false_walls,
+        targets=targets,
+        false_targets=false_targets,
+    )
