@@ -66,9 +66,10 @@ may be low by chance. [-]"""
 TILT_SHARE, OFFSET_SHARE = 1.3, 0.9
 """Variance of tilt and offset over what the modes let expect. From 124 realisations of six walls
 (20 to 40 cm, 20° and 45°, 0.01 to 0.1 mm rms, metal and drywall, 30 and 75 GHz): 0.45 to 2.1,
-and 0.5 to 1.3. ``python -m validation.experiments.thresholds walls``, with half the array, gave 0.2
-to 1.7 and 0.2 to 2.7, but 8 for the tilt of a wall of 40 cm at 0.4 m: lines that the echo does not
-place (:mod:`estimator.walls.line_refinement`) may state too small a variance there. [-]"""
+and 0.5 to 1.3. ``python -m validation.experiments.thresholds walls``, with half the array and 12
+realisations of each wall, gave 0.4 to 2.0 and 0.3 to 2.4 for walls of 20 cm up to 0.05 mm rms, but
+4.2 and 3.8 at 0.1 mm rms, and 15.5 and 5.1 for a wall of 40 cm at 0.4 m: lines that the echo does
+not place (:mod:`estimator.walls.line_refinement`) state too small a variance there. [-]"""
 SUMMIT_SAMPLES_PER_CELL = 4
 """Along the wall; the intensity has twice the image's bandwidth. [-]"""
 BRIGHTNESS = (1.5, 1.0, 0.5)

@@ -19,7 +19,9 @@ and a candidate line is off by half a cell. [cells]"""
 
 BEYOND_END = 4.0
 """Distance beyond a line's end within which a peak belongs to it: the ends are found to a few
-cells, as speckle hides the last ones. [cells]"""
+cells, as speckle hides the last ones. ``python -m validation.experiments.thresholds walls``: of 72
+simulated walls the farthest peak was 2.5 cells beyond an end in five families of six, and 4.7
+cells once in the sixth, at 20°. [cells]"""
 
 GOOD_PART = 1 / 3
 """Share of a line on another from which both are one wall, or behind others from which it is

@@ -61,6 +61,16 @@ ROOM_SEEDS = 1
 SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
 """Echoes on which constants are scanned, besides one simulated wall of each family. [-]"""
 
+USUAL_SHARES = 2.1, 1.3
+"""Largest mean squares of tilt and offset over the modes' expectation, as stated in the docstring
+of :data:`estimator.walls.line_fit_image.TILT_SHARE`. [-]"""
+LARGER_SHARES = {
+    "metal, 40 cm, 45°, 0.05 mm": (15.5, 5.1),
+    "metal, 20 cm, 45°, 0.1 mm": (4.2, 3.8),
+}
+"""The same of the families for which that docstring states larger ones: a known fault of lines that
+the echo does not place, which must not grow. [-]"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scan:
@@ -141,6 +151,7 @@ def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
             origin="the constant",
         )
 
+    most = LARGER_SHARES.get(name, USUAL_SHARES)
     found = column("turn").size / len(walls)
     if found == 0:
         return [row("walls found", "all but one in ten", 0.0, low=0.9)]
@@ -148,8 +159,8 @@ def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
         row("walls found", "all but one in ten", found, low=0.9),
         row("line_relations.BESIDE: 99 % of a wall's peaks, median", "cells",
             float(np.median(column("beside"))), high=line_relations.BESIDE),
-        row("line_relations.BEYOND_END: farthest peak, the worst", "cells",
-            float(column("beyond_end").max()), high=line_relations.BEYOND_END),
+        row("line_relations.BEYOND_END: farthest peak, of nine walls in ten", "cells",
+            float(np.quantile(column("beyond_end"), 0.9)), high=line_relations.BEYOND_END),
         row("wall_detection_2d.MOST_BENT: bent peaks, the worst", "share",
             float(column("bent").max()), high=wall_detection_2d.MOST_BENT),
         row("wall_detection_2d.WALL_COHERENCE: median over a wall, the worst", "coherence",
@@ -162,10 +173,10 @@ def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
             float(column("explained").min()), low=line_refinement.EXPLAINED),
         row("line_refinement.DISAGREEMENT: of image and echo, median", "over covariances",
             float(np.median(column("disagreement"))), high=line_refinement.DISAGREEMENT),
-        row("line_fit_image.TILT_SHARE: mean square over what modes let expect", "0.45 to 2.1",
-            float(column("tilt_share").mean()), high=2.1 * (1 + 4 / np.sqrt(len(walls)))),
-        row("line_fit_image.OFFSET_SHARE: the same of the offset", "0.5 to 1.3",
-            float(column("offset_share").mean()), high=1.3 * (1 + 4 / np.sqrt(len(walls)))),
+        row("line_fit_image.TILT_SHARE: mean square over what modes let expect", f"≤ {most[0]}",
+            float(column("tilt_share").mean()), high=most[0] * (1 + 4 / np.sqrt(len(walls)))),
+        row("line_fit_image.OFFSET_SHARE: the same of the offset", f"≤ {most[1]}",
+            float(column("offset_share").mean()), high=most[1] * (1 + 4 / np.sqrt(len(walls)))),
     ]  # fmt: skip
 
 
