@@ -18,13 +18,15 @@ MOST_PATHS = 4
 [-]"""
 LEAST_SHARE = 0.05
 """Share of the pilot's energy (less the noise) below which a wave is not looked at: the speckle of
-a rough wall has less. Chosen, not measured. [-]"""
+a rough wall has less. ``python -m validation.experiments.thresholds answers``: with 0.025 and 0.1
+the answers in seven rooms are the same, five of seven users found and right, none wrong. [-]"""
 CURVATURE_DEVIATIONS = 6.0
 """Deviations by which curvature and delay may disagree; the covariance is an estimate from few
 modes or tiles itself, and a rough mirror bends the wavefront in ways it only samples. [-]"""
 CURVATURE_SLACK = 0.1
-"""Further disagreement allowed, over the curvature; a scatterer must differ by more. Chosen, not
-measured. [-]"""
+"""Further disagreement allowed, over the curvature; a scatterer must differ by more. ``python -m
+validation.experiments.thresholds answers``: with 0.05 and 0.2 the answers in seven rooms are the
+same, five of seven users found and right, none wrong. [-]"""
 FARTHEST = 1000.0
 """Radius of curvature that a plane wave, or a hollow one, is taken to have: beyond any room. [m]"""
 
