@@ -13,12 +13,14 @@ from .measurement_files import read, write
 from .pipeline import simulate
 from .results.estimate import Estimate
 from .results.plots import plot_angle_range_map, plot_estimate, plot_image, plot_scenario, plot_user
+from .sionna_channel import SionnaChannel, to_sionna_cir
 
 __all__ = [
     "Echo",
     "Estimate",
     "Measurement",
     "Scenario",
+    "SionnaChannel",
     "Uplink",
     "design",
     "image",
@@ -37,6 +39,7 @@ __all__ = [
     "simulate",
     "simulate_full_wave",
     "sweep",
+    "to_sionna_cir",
     "track",
     "write",
 ]

@@ -249,6 +249,8 @@ def _over_mirrors_alone(
         image = leg.image(send)
         towards = receive.positions - image.positions
         lengths = np.sqrt(np.einsum("lx,lx->l", towards, towards))
+        if not lengths.all():  # two faces of one plane: the image is the antenna itself
+            continue
         directions = towards / lengths[:, None]
         gains = image.pattern.towards(directions) * receive.pattern.towards(-directions)
         peak = send.pattern.peak * receive.pattern.peak
