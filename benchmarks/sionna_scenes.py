@@ -4,9 +4,9 @@
     python -m benchmarks.sionna_scenes box --ghz 60         # one of them, here
 
 One user, an array of 8 elements half a wavelength apart, 41 frequencies over the 0.4 GHz below the
-given one (marble is known up to 60 GHz), no transmission through slabs in either program. The difference is the norm of the pilots' difference
-over that of Sionna's pilot: its path solver's coefficients at the middle of the band, summed with
-their delays.
+given one (marble is known up to 60 GHz), no transmission through slabs in either program. The
+difference is the norm of the pilots' difference over that of Sionna's pilot: its path solver's
+coefficients at the middle of the band, summed with their delays.
 """
 
 import argparse
