@@ -78,6 +78,7 @@ def run(
         from mmslam.terminal.stage_progress import StageProgress
 
         loaded = mmslam.load_scenario(scenario, overrides or [])
+        _tell_ranges(loaded)
         folder = out or Path("out") / f"{loaded.name}-{seed}"
         with stdout_kept_clean(), StageProgress() as progress:
             from mmslam.pipeline import run_scenario
@@ -106,6 +107,7 @@ def simulate(
         from mmslam.terminal.stage_progress import StageProgress
 
         loaded = mmslam.load_scenario(scenario, overrides or [])
+        _tell_ranges(loaded)
         notes: tuple[str, ...] = ()
         with stdout_kept_clean(), StageProgress() as progress:
             if full_wave:
@@ -128,6 +130,14 @@ def simulate(
                 lines = model_lines(told.attrs) if told is not None else ()
                 notes = (*model_notes(loaded, seed=seed), *lines)
         print_written(output, measurement, as_json, notes)
+
+
+def _tell_ranges(scenario: mmslam.Scenario) -> None:
+    """Print notes on a frequency grid too coarse for the scene, before any long work."""
+    from simulator.scene.unambiguous_range import range_notes
+
+    for note in range_notes(scenario):
+        typer.echo(f"note: {note}", err=True)
 
 
 def locate(

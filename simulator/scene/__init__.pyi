@@ -4,6 +4,7 @@ from .radio_scene import RadioScene, antenna_pattern, facet_ports, scenario_mate
 from .scenario_paths import ScenarioPath
 from .scene_mirrors import SceneMirrors
 from .truth import scenario_truth
+from .unambiguous_range import range_notes
 
 __all__ = [
     "RadioScene",
@@ -14,6 +15,7 @@ __all__ = [
     "facet_ports",
     "in_space",
     "mirrored_bodies",
+    "range_notes",
     "scenario_materials",
     "scenario_truth",
     "sending_group",
