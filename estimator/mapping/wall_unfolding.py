@@ -24,7 +24,9 @@ SAMPLES = 9
 share of them is told to a ninth, and most of them from a half. [-]"""
 SAME_PLACE = 3.0
 """Distance within which an unfolded line and a wall that is seen otherwise are one: both lines are
-off by a cell, and mirroring doubles a mirror's error. Chosen, not measured. [cells]"""
+off by a cell, and mirroring doubles a mirror's error. ``python -m
+validation.experiments.thresholds answers``: with 1.5 and 6 the answers in three rooms of two walls
+are the same: six of six walls found, none false, and four false targets. [cells]"""
 MOST = 0.5
 """Share of a line from which most of it is meant. [-]"""
 MIXED_SAMPLES = 65
