@@ -19,8 +19,9 @@ table; and no scan's own value gives fewer right answers, or more false ones, th
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -32,11 +33,14 @@ from validation.trials.drawn_echoes import Kind
 from validation.trials.room_answers import (
     BODIES,
     DIFFUSE,
+    DIFFUSE_SEEDS,
     PATHS,
     WALLS_IN_WALLS,
     Answers,
     SimulatedRoom,
     answers,
+    diffuse_answers,
+    rough_pilot,
     simulated_room,
 )
 from validation.trials.wall_statistics import (
@@ -112,11 +116,12 @@ ANSWER_SCANS = (
          rooms=WALLS_IN_WALLS),
     Scan(module="estimator.mapping.target_detection", name="WIDE", values=(1.0, 4.0),
          rooms=BODIES),
-    Scan(module="estimator.positioning.diffuse_positioning", name="RIVAL", values=(0.8, 0.95),
-         rooms=DIFFUSE),
 )  # fmt: skip
-"""Constants that decide on paths, positions and targets, with half and twice their value; of a
-share near 1, with half and twice its distance from 1."""
+"""Constants that decide on paths, walls and targets, with half and twice their value."""
+RIVAL_SCAN = Scan(
+    module="estimator.positioning.diffuse_positioning", name="RIVAL", values=(0.8, 0.95)
+)
+"""The same for positions by diffuse scattering, with twice and half its distance from 1."""
 
 
 def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
@@ -238,13 +243,13 @@ def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
     )
 
 
-def answer_scan(one: Scan, rooms: Sequence[SimulatedRoom]) -> dict[float, Answers]:
-    """Locate the users of rooms with a constant's own value and with the neighbouring ones."""
+def answer_scan(one: Scan, answered: Callable[[], Answers]) -> dict[float, Answers]:
+    """Count answers with a constant's own value and with the neighbouring ones."""
     own = getattr(sys.modules[one.module], one.name)
     results = {}
     for value in sorted({own, *one.values}):
         with changed(one.module, one.name, value):
-            results[value] = answers(rooms)
+            results[value] = answered()
     return results
 
 
@@ -307,9 +312,13 @@ def main(arguments: list[str]) -> None:
             for key in keys:
                 if key not in simulated:
                     simulated[key] = simulated_room(*key)
-            told = answer_scan(one, [simulated[key] for key in keys])
+            told = answer_scan(one, partial(answers, [simulated[key] for key in keys]))
             print(answer_line(one, told), flush=True)
             rows.append(answer_row(one, told))
+        pilots = [rough_pilot(*wall, seed) for wall in DIFFUSE for seed in range(DIFFUSE_SEEDS)]
+        told = answer_scan(RIVAL_SCAN, partial(diffuse_answers, pilots))
+        print(answer_line(RIVAL_SCAN, told), flush=True)
+        rows.append(answer_row(RIVAL_SCAN, told))
     conclude(rows)
 
 

@@ -1,24 +1,29 @@
 """Whole answers to simulated rooms against the truth, as one constant of the estimator changes.
 
 The rooms are those of :mod:`validation.trials.trap_rooms`, which are small. Each group of constants
-has its own ones, in which their decisions occur.
+has its own ones, in which their decisions occur. For the search by diffuse scattering, which a
+whole estimate seldom needs, it is run by itself, with the true wall.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from scipy.stats import chi2
 
+from estimator.geometry.wall_2d import Wall
 from estimator.localization.pipeline import locate
-from estimator.measurement.model import Measurement
+from estimator.measurement.model import Measurement, Uplink
+from estimator.positioning.diffuse_positioning import SeenWall, search_diffuse
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
-from validation.metrics.coverage import position_errors
+from validation.metrics.coverage import normalised_square, position_errors
 from validation.metrics.mirror_check import seen_mirrors
 from validation.metrics.target_association import target_distances
 from validation.metrics.truth import Truth, truth_from_dataset
-from validation.trials.trap_rooms import TRAPS
+from validation.trials.trap_rooms import HALF_SIZE, TRAPS
+from validation.trials.trap_rooms import user as user_at
 
 REGION = float(chi2.ppf(0.999, 2))
 """Normalised square of an error beyond which a position that is called found is wrong. [-]"""
@@ -40,8 +45,10 @@ PATHS = (
     "post before the wall",
 )
 """Rooms whose pilots come over a wall, in line of sight, and from edges and curved bodies."""
-DIFFUSE = ("wall turned away", "wall turned far away")
-"""Rooms whose pilots come by diffuse scattering."""
+DIFFUSE = tuple((angle, rms) for angle in (25.0, 35.0, 45.0, 60.0) for rms in (0.05, 0.15))
+"""Angle [°] and rms height [mm] of walls for diffuse scattering; only at 45° is there a path."""
+DIFFUSE_SEEDS = 2
+"""Realisations of each of these walls. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,4 +112,54 @@ def answers(rooms: Sequence[SimulatedRoom]) -> Answers:
         false_walls=false_walls,
         targets=targets,
         false_targets=false_targets,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoughPilot:
+    """A pilot over one rough wall, and the true wall and position."""
+
+    uplink: Uplink
+    wall: Wall  # without uncertainty
+    position: Float[np.ndarray, " 3"]  # [m]
+
+
+def rough_pilot(angle_deg: float, rms_mm: float, seed: int) -> RoughPilot:
+    """Simulate the pilot of a user over one rough wall, at half the size of ``slam_2d``."""
+    overrides = [
+        *HALF_SIZE,
+        *user_at(0.45, 0.4),
+        f"objects.wall.angle_deg={angle_deg}",
+        f"objects.wall.roughness.rms_mm={rms_mm}",
+        "objects.wall.roughness.correlation_mm=0.5",
+    ]
+    simulation = simulate(load_scenario("slam_2d", overrides), seed=seed)
+    truth = truth_from_dataset(simulation.truth)
+    start, end = truth.wall_start["wall"], truth.wall_end["wall"]
+    return RoughPilot(
+        uplink=simulation.measurement.uplinks[0],
+        wall=Wall(start=start, end=end, covariance=np.zeros((2, 2))),
+        position=truth.user_position["user"],
+    )
+
+
+def diffuse_answers(pilots: Sequence[RoughPilot]) -> Answers:
+    """Search users by diffuse scattering alone; found are those without rival positions."""
+    errors: list[float] = []
+    right = 0
+    for one in pilots:
+        fix = search_diffuse(one.uplink, [SeenWall(seen=one.wall, true=one.wall, through=())])
+        if fix is None or len(fix.rivals):
+            continue
+        error = (fix.position - one.position)[:2]
+        errors.append(float(np.linalg.norm(error)))
+        right += normalised_square(error, fix.covariance[:2, :2]) < REGION
+    return Answers(
+        right=right,
+        wrong=len(errors) - right,
+        median_error=float(np.median(errors)) if errors else np.nan,
+        walls=0,
+        false_walls=0,
+        targets=0,
+        false_targets=0,
     )

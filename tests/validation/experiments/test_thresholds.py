@@ -9,6 +9,7 @@ import pytest
 from estimator.walls import line_relations
 from validation.experiments.thresholds import (
     ANSWER_SCANS,
+    RIVAL_SCAN,
     SCANS,
     Scan,
     answer_row,
@@ -19,7 +20,7 @@ from validation.experiments.thresholds import (
 )
 from validation.trials import chance_finds
 from validation.trials.drawn_echoes import draw_echo
-from validation.trials.room_answers import answers, simulated_room
+from validation.trials.room_answers import answers, diffuse_answers, rough_pilot, simulated_room
 from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
 
 
@@ -75,7 +76,7 @@ def test_a_constant_is_changed_wherever_it_is_imported() -> None:
     assert vars(user)["BEYOND_END"] == own
 
 
-@pytest.mark.parametrize("one", [*SCANS, *ANSWER_SCANS], ids=lambda one: one.name)
+@pytest.mark.parametrize("one", [*SCANS, *ANSWER_SCANS, RIVAL_SCAN], ids=lambda one: one.name)
 def test_each_scan_is_of_a_constant_that_exists_between_the_values_tried(one: Scan) -> None:
     low, high = one.values
     module = importlib.import_module(one.module)
@@ -94,6 +95,15 @@ def test_a_user_in_sight_is_a_right_answer_and_is_lost_where_no_path_may_count()
     own = getattr(importlib.import_module(one.module), one.name)
     assert answer_row(one, {own: seen, 2.0: lost}).measured == 0
     assert not answer_row(one, {own: lost, 2.0: replace(seen, right=3)}).passed
+
+
+def test_a_user_over_a_rough_wall_is_placed_unless_every_place_is_a_rival() -> None:
+    pilot = rough_pilot(35.0, 0.05, 0)
+    placed = diffuse_answers([pilot])
+    assert (placed.right, placed.wrong) == (1, 0)
+    with changed(RIVAL_SCAN.module, RIVAL_SCAN.name, 0.0):
+        open_ = diffuse_answers([pilot])
+    assert (open_.right, open_.wrong) == (0, 0)
 
 
 @pytest.mark.slow
