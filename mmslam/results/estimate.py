@@ -13,12 +13,10 @@ from functools import cached_property
 from math import degrees, sqrt
 from typing import TYPE_CHECKING, Any, SupportsIndex, TypeVar, overload
 
-import numpy as np
-from jaxtyping import Float
-
 from estimator.measurement import model
 from estimator.results import estimate as plain
 from mmslam.plain_text import drawn_plainly
+from mmslam.results.estimate_tables import mirrors_table, point, targets_table
 from mmslam.table import Table, html, text
 from validation.metrics.truth import Truth
 
@@ -89,7 +87,7 @@ class Mirror(_Shown, plain.Mirror):
 
     def tables(self) -> list[Table]:
         """Return its ends and their uncertainty."""
-        return [_mirrors_table([self])]
+        return [mirrors_table([self])]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -98,7 +96,7 @@ class Target(_Shown, plain.Target):
 
     def tables(self) -> list[Table]:
         """Return its position, and its apparent position in the raw image."""
-        return [_targets_table([self])]
+        return [targets_table([self])]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -307,8 +305,8 @@ class Estimate(_Shown, plain.Estimate):
         """Return users, mirrors, targets and notes."""
         notes = Table(rows=[(f"note: {note}",) for note in self.notes])
         none = Table(rows=[("no mirror found",)])
-        found = [_mirrors_table(self.mirrors) if self.mirrors else none]
-        found += [_targets_table(self.targets)] if self.targets else []
+        found = [mirrors_table(self.mirrors) if self.mirrors else none]
+        found += [targets_table(self.targets)] if self.targets else []
         return [_users_table(self.users), *found, notes]
 
     def _picture(self) -> str:
@@ -345,7 +343,7 @@ def _users_table(users: Sequence[User]) -> Table:
             (
                 user.name,
                 user.status.replace("_", " "),
-                "" if user.position is None else _point(user.position),
+                "" if user.position is None else point(user.position),
                 "" if spread is None else f"{1e3 * spread:.3f}",
                 _over(user),
                 user.reason or "",
@@ -361,45 +359,6 @@ def _over(user: plain.UserEstimate) -> str:
     if user.bounces:
         return f"{user.bounces} mirror{'' if user.bounces == 1 else 's'}"
     return "direct" if user.method == "paths" else "diffuse"
-
-
-def _mirrors_table(mirrors: Sequence[plain.Mirror]) -> Table:
-    rows = []
-    for index, mirror in enumerate(mirrors):
-        angle, offset = float(mirror.covariance[0, 0]), float(mirror.covariance[-1, -1])
-        rows.append(
-            (
-                str(index),
-                _point(mirror.start),
-                _point(mirror.end),
-                f"{degrees(sqrt(angle)):.4f}",
-                f"{1e3 * sqrt(offset):.3f}",
-                ", ".join(map(str, mirror.seen_through)),
-            )
-        )
-    heads = ("mirror", "from [m]", "to [m]", "± [°]", "± [mm]", "seen through")
-    return Table(heads=heads, rows=rows)
-
-
-def _targets_table(targets: Sequence[plain.Target]) -> Table:
-    rows = [
-        (
-            str(index),
-            _point(target.position),
-            _point(target.ghost),
-            "" if target.level_db is None else f"{target.level_db:.1f}",
-            ", ".join(map(str, target.seen_through)),
-        )
-        for index, target in enumerate(targets)
-    ]
-    heads = ("target", "position [m]", "image shows it at", "level [dB]", "seen through")
-    return Table(heads=heads, rows=rows)
-
-
-def _point(place: Float[np.ndarray, " 3"]) -> str:
-    """Write a point; in the plane z = 0, without its z."""
-    shown = place[:2] if place[2] == 0 else place
-    return "(" + ", ".join(f"{value:.4f}" for value in shown) + ")"
 
 
 def _png(plot: Any) -> str:
