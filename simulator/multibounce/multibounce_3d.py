@@ -1,18 +1,19 @@
-r"""The echo over several surfaces in 3-D: targets seen over mirrors, and chains of mirrors alone.
+r"""Echoes and pilots in space over several surfaces: targets over mirrors, and flat faces.
 
-A target (a body other than a plate, of at most
-:data:`simulator.scene.scene_mirrors.LARGEST_TARGET`) is illuminated over legs: directly, or over
-mirrors. Its facets scatter from one leg into another: wall-target, target-wall, wall-target-wall,
-with the mirrors' reflection at each frequency and the coherent loss of their roughness. The direct
-echo is left to plain physical optics. In a chain between two targets, the later one is of facets
-and the earlier one is a mirror. Chains without a target (three walls of a corner) are images of the
-antenna itself.
+A target (a curved body of any size, or another that is no plate, of at most
+:data:`simulator.scene.scene_mirrors.LARGEST_TARGET`) is lit over legs: directly, or over
+mirrors. Its facets scatter what comes over one leg into another: wall-target, target-wall,
+wall-target-wall, with the mirrors' reflection at each frequency and the coherent loss of their
+roughness. The direct way out and back is left to plain physical optics. Of a chain between two
+targets the later one is cut into facets, and the other one is a mirror. What no target is cut in
+(corners, tilted plates, bodies that see themselves) is
+:mod:`simulator.multibounce.flat_chains_3d`'s.
 
 The diffuse part is that of :mod:`simulator.multibounce.diffuse_echo_3d`.
 
-Approximations: visibility of a target over a leg is traced at one facet of each patch; the field
-over mirrors has only the component along the field of the antenna's image; chains of two targets
-of which the earlier is curved are left out.
+What is neglected: which part of a target a leg lights is found patch by patch, from one facet of
+each; of what comes over mirrors to the target, the part across the field of the antenna's image;
+chains of two curved targets.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Int
 
 from simulator.antennas.beam_culling import LEVEL, AntennaGroup, in_reach
 from simulator.antennas.links import Links
@@ -32,18 +33,14 @@ from simulator.geometry.ray_scene import blocked
 from simulator.materials.facet_reflection import reflection_nodes
 from simulator.materials.slab_insertion import LEAST_LEVEL, passage_level, passage_nodes
 from simulator.multibounce.diffuse_echo_3d import diffuse_echo
+from simulator.multibounce.flat_chains_3d import over_flat_faces
 from simulator.scattering.patch_sum import COEFFICIENT_ACCURACY, scattered_by_patches
 from simulator.scene.radio_scene import RadioScene
 from simulator.scene.scene_mirrors import SceneMirrors
-from simulator.specular.free_space import direct_wave
-from simulator.specular.image_method import trace_chain, unfolded_chain
+from simulator.specular.image_method import trace_chain
 from simulator.specular.image_sources import DIRECT, Leg, LegReflection
-from simulator.specular.path_field import Through, reflected_field
+from simulator.specular.path_field import Through
 from simulator.visibility.seen import Seen
-
-NUDGE = np.array([2e-5, 1.4e-5, 0.9e-5])
-"""Displacement of a receiver, either way, to test whether its path meets an edge: farther than
-rays are moved off their mirrors, and along no edge of a usual room. [m]"""
 
 
 def echo_over_mirrors(
@@ -67,44 +64,98 @@ def coherent_echo(
     scene
         The frozen scene.
     send, receive
-        The array's antennas, linked pairwise; the same object for monostatic echoes.
+        The array's antennas, pairwise; the same object if each hears its own echo.
 
     Returns
     -------
     S-parameter at each antenna. [-]
     """
-    frequencies = scene.scenario.radio.frequencies
-    echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
-    most = scene.scenario.max_bounces - 1
     among = scene.mirrors
     if among is None:
-        return echo
-    order = {name: index for index, name in enumerate(scene.scattering)}
-    names = [name for name in among.targets if name in order]
-    for name in names:
-        facets = scene.facets_of(name)
+        shape = (len(receive.positions), scene.scenario.radio.points)
+        return np.zeros(shape, dtype=np.complex128)
+    echo = _over_targets(scene, among, send, receive)
+    flat = [
+        leg.sequence
+        for leg in among.chains
+        if among.by_images(leg) and scene.facet_target(leg.sequence) is None
+    ]
+    return np.asarray(echo + over_flat_faces(scene, flat, send, receive))
+
+
+def coherent_pilot(
+    scene: RadioScene, sender: AntennaGroup, receive: AntennaGroup
+) -> Complex[np.ndarray, "elements freqs"]:
+    """Sum the coherent part of a user's pilot over two and more surfaces.
+
+    Parameters
+    ----------
+    scene
+        The frozen scene.
+    sender
+        The user's antenna.
+    receive
+        The array's antennas.
+
+    Returns
+    -------
+    S-parameter at each element. [-]
+    """
+    among = scene.mirrors
+    if among is None:
+        shape = (len(receive.positions), scene.scenario.radio.points)
+        return np.zeros(shape, dtype=np.complex128)
+    pilot = _over_targets(scene, among, sender, receive)
+    # From the user the mirrors of a leg of the array are met in turn; other chains are out of
+    # the reach of the array's pattern, whatever the user's.
+    flat = [
+        leg.sequence[::-1]
+        for leg in among.chains
+        if among.by_images(leg) and scene.facet_target(leg.sequence) is None
+    ]
+    return np.asarray(pilot + over_flat_faces(scene, flat, sender, receive))
+
+
+def _over_targets(
+    scene: RadioScene, among: SceneMirrors, send: AntennaGroup, receive: AntennaGroup
+) -> Complex[np.ndarray, "links freqs"]:
+    """Sum what targets' facets scatter from one leg of mirrors into another."""
+    frequencies = scene.scenario.radio.frequencies
+    total = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
+    most = scene.scenario.max_bounces - 1
+    for name in among.targets:
+        if name not in scene.scattering:
+            continue
         own = among.of(name)
         legs = [DIRECT, *(leg for leg in among.legs if not own.intersection(leg.sequence))]
-        target = _Target(scene, among.mirrors, facets, send, receive)
+        target = _Target(scene, among.mirrors, scene.facets_of(name), send, receive)
+        leads = [target.lit_over(leg, send) for leg in legs]
+        heard = leads if send is receive else [target.lit_over(leg, receive) for leg in legs]
         bounces = np.array([leg.bounces for leg in legs])
         together = bounces[:, None] + bounces
         wanted = (together >= 1) & (together <= most)
-        if send is receive:  # each path is also traversed in reverse
+        if send is receive:  # the same way the other way round
             wanted = np.triu(wanted)
         for out, back in np.argwhere(wanted).tolist():
+            if not (leads[out] and heard[back]):
+                continue
             pair = legs[out], legs[back]
-            # The chain ends at another target, too: it is evaluated at the later one.
-            ends = [leg.sequence[0] for leg in pair if leg.sequence]
-            other = among.owners[ends[0]]
-            if len(ends) == 1 and own and other in names and order[other] > order[name]:
+            # Over several targets that are mirrors, too: one of them is cut into facets.
+            around = (*pair[0].sequence, *pair[1].sequence)
+            if own and scene.facet_target((*around, *sorted(own)[:1])) != name:
                 continue
             twice = 2.0 if send is receive and out != back else 1.0
-            echo += twice * target.echo(*pair)
-    return np.asarray(echo + _over_mirrors_alone(scene, among, send, receive))
+            total += twice * target.wave(*pair)
+    return total
+
+
+SAMPLES = 400
+"""Facets of a target, spread over it, that tell whether a leg leads there: a leg is missed if it
+lights less than one in so many. [-]"""
 
 
 class _Sight(NamedTuple):
-    """Visibility of patches over a leg through one set of slabs."""
+    """Patches that antennas see over a leg through the same slabs."""
 
     through: Through
     seen: Bool[np.ndarray, "links patches"]
@@ -118,8 +169,25 @@ class _Target:
     send: AntennaGroup
     receive: AntennaGroup
 
-    def echo(self, out: Leg, back: Leg) -> Complex[np.ndarray, "links freqs"]:
-        """Sum the target's scattering from one leg into another."""
+    def lit_over(self, leg: Leg, sight: AntennaGroup) -> bool:
+        """Tell whether a leg leads to the target at all, were nothing in the way, by samples."""
+        facets = self.facets.part(
+            np.arange(0, self.facets.count, max(1, self.facets.count // SAMPLES))
+        )
+        image = leg.image(sight)
+        reached = in_reach([(image, image)], facets.centres, 0.0, level=LEVEL**2)
+        chain = trace_chain(
+            self.mirrors,
+            leg.sequence,
+            sight.outline,
+            facets.places[reached],
+            blocked=lambda starts, ends: np.zeros(len(starts), dtype=bool),
+            clearance=self.scene.rays.clearance,
+        )
+        return bool(chain.valid.any())
+
+    def wave(self, out: Leg, back: Leg) -> Complex[np.ndarray, "links freqs"]:
+        """Sum what the target scatters from one leg into another."""
         scene, facets = self.scene, self.facets
         frequencies = scene.scenario.radio.frequencies
         links_count = len(self.receive.positions)
@@ -138,6 +206,8 @@ class _Target:
         patch_of = np.full(facets.count, -1)
         patch_of[patches.order] = np.repeat(np.arange(patches.count), np.diff(patches.first))
         places = sent.positions
+        if len(places) == 1:
+            places = np.repeat(places, links_count, axis=0)
         links = Links(
             senders=places,
             receivers=places if same else heard.positions,
@@ -165,7 +235,7 @@ class _Target:
         return spectrum
 
     def _nodes(self, out: Leg, back: Leg, through: tuple[Through, Through]) -> int:
-        """Count the frequencies at which the factor of mirrors and slabs is sampled."""
+        """Count the frequencies at which mirrors and slabs have to be known."""
         frequencies = self.scene.scenario.radio.frequencies
         start, stop = float(frequencies[0]), float(frequencies[-1])
         nodes = 3  # the loss of roughness
@@ -182,7 +252,7 @@ class _Target:
         order: Int[np.ndarray, " facets"],
         first: Int[np.ndarray, " patches_and_one"],
     ) -> list[_Sight]:
-        """Trace one facet of each patch over a leg: the one that faces the antennas most."""
+        """Trace one facet of each patch over a leg, from every antenna: what faces them most."""
         facets = self.facets.part(order)
         towards = leg.image(sight).centre - facets.centres
         facing = np.abs(np.einsum("fx,fx->f", towards, facets.mean_normals))
@@ -221,7 +291,7 @@ def _look_up(
     patch_of: Int[np.ndarray, " facets"],
     some: Int[np.ndarray, " some"],
 ) -> Seen:
-    """Return the visibility of some facets: that of their patches."""
+    """Tell what is seen of some facets from what is seen of their patches."""
     always, ever = np.asarray(seen.all(axis=0)), np.asarray(seen.any(axis=0))
     patches = patch_of[some]
     mixed = np.flatnonzero((ever & ~always)[patches])
@@ -230,87 +300,3 @@ def _look_up(
         sometimes=mixed,
         table=np.ascontiguousarray(seen[:, patches[mixed]].T),
     )
-
-
-def _over_mirrors_alone(
-    scene: RadioScene, among: SceneMirrors, send: AntennaGroup, receive: AntennaGroup
-) -> Complex[np.ndarray, "links freqs"]:
-    """Sum the chains that return to the array over mirrors, without a target.
-
-    Chains over a single mirror only where its body has no facets.
-    """
-    frequencies = scene.scenario.radio.frequencies
-    echo = np.zeros((len(receive.positions), frequencies.size), dtype=np.complex128)
-    mirrors = among.mirrors
-    for leg in among.chains:
-        over_target = any(among.owners[mirror] in among.targets for mirror in leg.sequence)
-        if over_target or not among.by_images(leg):
-            continue
-        image = leg.image(send)
-        towards = receive.positions - image.positions
-        lengths = np.sqrt(np.einsum("lx,lx->l", towards, towards))
-        if not lengths.all():  # two faces of one plane: the image is the antenna itself
-            continue
-        directions = towards / lengths[:, None]
-        gains = image.pattern.towards(directions) * receive.pattern.towards(-directions)
-        peak = send.pattern.peak * receive.pattern.peak
-        if gains.max(initial=0.0) < LEVEL * peak:
-            continue
-        some = np.flatnonzero(gains >= LEVEL * peak)
-        shares, crossed = _shares(
-            scene, mirrors, leg, send.positions[some], receive.positions[some]
-        )
-        some, shares, crossed = some[shares > 0.0], shares[shares > 0.0], crossed[shares > 0.0]
-        if some.size == 0:
-            continue
-        kinds, kind = np.unique(crossed, axis=0, return_inverse=True)
-        for index, sets in enumerate(kinds.tolist()):
-            alike = np.flatnonzero(kind.ravel() == index)
-            here = some[alike]
-            chain = unfolded_chain(
-                mirrors, leg.sequence, image.positions[here], receive.positions[here], paired=True
-            )
-            field = reflected_field(
-                mirrors,
-                chain,
-                frequencies,
-                sent=send.pattern.polarization,
-                received=receive.pattern.polarization,
-                through=tuple(scene.slabs.crossings(one) for one in sets),
-            )
-            wave = direct_wave(lengths[here], frequencies, waves="spherical")
-            echo[here] += (shares[alike] * gains[here])[:, None] * field * wave
-    return echo
-
-
-def _shares(
-    scene: RadioScene,
-    mirrors: Mirrors,
-    leg: Leg,
-    sources: Float[np.ndarray, "links 3"],
-    receivers: Float[np.ndarray, "links 3"],
-) -> tuple[Float[np.ndarray, " links"], Int[np.ndarray, "links legs"]]:
-    """Return the weights of a leg's paths, 0 or 1, and 1/2 on an edge; and the slabs crossed.
-
-    Between two walls at right angles, the path back to the antenna meets their common edge. Both
-    orders of the walls then have the weight 1/2, as in physical optics: half of the Fresnel zone is
-    on either wall. The second result is the set of slabs on each part of the path.
-    """
-    shares = np.zeros(len(sources))
-    crossed = np.zeros((len(sources), leg.bounces + 1), dtype=np.int64)
-    for side in (1.0, -1.0):
-        chain = trace_chain(
-            mirrors,
-            leg.sequence,
-            sources,
-            receivers + side * NUDGE,
-            blocked=partial(blocked, scene.rays),
-            clearance=scene.rays.clearance,
-            paired=True,
-            slabs=scene.slabs,
-        )
-        valid = np.diagonal(chain.valid)
-        shares += 0.5 * valid
-        if chain.crossed is not None:
-            crossed[valid] = chain.crossed
-    return shares, crossed

@@ -1,7 +1,6 @@
 """A user's pilot at the array: line of sight, specular chains, and scattering by facets."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from jaxtyping import Complex
@@ -9,9 +8,9 @@ from jaxtyping import Complex
 from scenes.scenario import User
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.ports import Ports
-from simulator.geometry.ray_scene import blocked
 from simulator.multibounce.diffuse_field_3d import diffuse_wave
 from simulator.multibounce.multibounce_2d import SeveralProgress, untold, uplink_over_surfaces
+from simulator.multibounce.multibounce_3d import coherent_pilot
 from simulator.response.direct_pilot import direct_pilot
 from simulator.response.over_one_surface import over_one_surface
 from simulator.response.round_edges import pilot_round_edges
@@ -19,8 +18,6 @@ from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scene.array_antennas import array_group, in_space, user_group
 from simulator.scene.radio_scene import RadioScene, facet_ports
 from simulator.specular.diffuse_chains import diffuse_legs
-from simulator.specular.image_method import trace_chain
-from simulator.specular.path_field import specular_response
 
 
 def simulate_uplink(
@@ -61,7 +58,7 @@ def simulate_uplink(
             array_group(scene.scenario, scene.elements),
         )
         over_one = scattered_in_space(scene, sender, array_there, advance=advance)
-        over_more_there = _over_mirrors(scene, sender, array_there)
+        over_more_there = coherent_pilot(scene, sender, array_there)
         over_more_there += _diffuse_over_mirrors(scene, sender, array_there)
         return np.asarray(pilot + over_one + over_more_there)
     if scene.scenario.effects.diffraction:
@@ -84,42 +81,6 @@ def simulate_uplink(
         progress=over_several,
     )
     return np.asarray(both + over_more)
-
-
-def _over_mirrors(
-    scene: RadioScene, sender: AntennaGroup, array: AntennaGroup
-) -> Complex[np.ndarray, "elements freqs"]:
-    """Sum the specular paths in three dimensions; over one mirror if its body has no facets."""
-    frequencies, most = scene.scenario.radio.frequencies, scene.scenario.max_bounces
-    if scene.mirrors is None:
-        return np.zeros((len(array.positions), frequencies.size), dtype=np.complex128)
-    # From the user, a leg's mirrors are met in reverse order; chains that are not legs of the
-    # array lie outside its pattern, for any user.
-    chains = (
-        trace_chain(
-            scene.mirrors.mirrors,
-            leg.sequence[::-1],
-            sender.positions,
-            array.positions,
-            blocked=partial(blocked, scene.rays),
-            clearance=scene.rays.clearance,
-            slabs=scene.slabs,
-        )
-        for leg in scene.mirrors.chains
-        if leg.bounces <= most and scene.mirrors.by_images(leg)
-    )
-    response: np.ndarray = specular_response(
-        scene.mirrors.mirrors,
-        chains,
-        frequencies,
-        (1, len(array.positions)),
-        transmit=sender.pattern.towards,
-        receive=array.pattern.towards,
-        sent=sender.pattern.polarization,
-        received=array.pattern.polarization,
-        slabs=scene.slabs,
-    )
-    return np.asarray(response[0])
 
 
 def _diffuse_over_mirrors(

@@ -70,7 +70,7 @@ def needed_reach(
     chosen = np.argwhere(bounces[:, None] + bounces <= most).tolist()
     pairs = [(outward[out], homeward[back]) for out, back in chosen]
     users = [user_group(scenario, name) for name in scenario.users]
-    pairs += [(user, array) for user in users]
+    pairs += [(ways[out].image(user), homeward[back]) for user in users for out, back in chosen]
     over_several = []
     for chain in rough:
         ends = {id(sight): chain.before.image(sight) for sight in (send, array)}

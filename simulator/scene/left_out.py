@@ -18,16 +18,13 @@ from scipy.special import fresnel
 from scenes.realisations.object_surface import Surface
 from scenes.scenario import Scenario
 from scenes.schema.effects import Effects
-from scenes.schema.objects import Plate
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mean_surfaces import mean_mirrors, mean_surfaces
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.ray_scene import RayScene, blocked, build_scene
 from simulator.geometry.slabs import Slabs
-from simulator.materials.fresnel_slab import Absorber
 from simulator.scene.array_antennas import array_group, user_group
 from simulator.scene.radio_scene import opaque, scenario_materials
-from simulator.scene.scene_mirrors import LARGEST_TARGET, longest_side
 from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import find_chains
@@ -100,13 +97,11 @@ def model_told(scenario: Scenario) -> dict[str, str | list[str]]:
 
     Returns
     -------
-    ``model``: bounces and effects; ``left_out``: classes of paths with their level;
-    ``bodies_left_out``: names of bodies without echoes over walls.
+    ``model``: bounces and effects; ``left_out``: classes of paths with their level.
     """
     return {
         "model": effects_told(scenario),
         "left_out": [str(one) for one in left_out(scenario)],
-        "bodies_left_out": list(bodies_not_seen_over_walls(scenario)),
     }
 
 
@@ -115,28 +110,6 @@ def model_lines(told: Mapping[str, object]) -> Iterator[str]:
     left = told.get("left_out")
     most = str(left[0]) if isinstance(left, list) and left else "nothing known above -60 dB"
     yield f"{told.get('model')}; left out of pilots, at most: {most}"
-    bodies = told.get("bodies_left_out")
-    if isinstance(bodies, list) and bodies:
-        yield (
-            f"objects.{', objects.'.join(map(str, bodies))}: echoes over walls are left out, as "
-            f"curved bodies of more than {LARGEST_TARGET:g} m have no ghosts in space"
-        )
-
-
-def bodies_not_seen_over_walls(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of bodies in 3-D too large to be facetted for ghosts, but not mirrors."""
-    if scenario.dimensions != 3 or scenario.max_bounces < 2 or scenario.base_station.multistatic:
-        return ()
-    surfaces = {surface.name: surface for surface in mean_surfaces(scenario)}
-    materials = scenario_materials(scenario)
-    return tuple(
-        name
-        for name, body in scenario.objects.items()
-        if not isinstance(body, Plate)
-        and not isinstance(materials[name], Absorber)
-        and longest_side(scenario, name) > LARGEST_TARGET
-        and not len(mean_mirrors(scenario, [surfaces[name]], materials))
-    )
 
 
 def _of_user(scenario: Scenario, room: "_Room", name: str) -> Iterator[tuple[str, float]]:

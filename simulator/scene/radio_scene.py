@@ -73,6 +73,18 @@ class RadioScene:
             raise ValueError(f"{name!r} has no facets; known: {', '.join(self.scattering)}")
         return self.facets.part(np.flatnonzero(self.facets.material == self.scattering.index(name)))
 
+    def facet_target(self, sequence: Sequence[int]) -> str | None:
+        """Name the target that a chain of flat faces in space is cut into facets at.
+
+        It is the last one in the scene of those of which the chain meets just one face; None:
+        physical optics is left to a mean plane.
+        """
+        if self.mirrors is None:
+            return None
+        owners = [self.mirrors.owners[mirror] for mirror in sequence]
+        once = [name for name in self.scattering if owners.count(name) == 1]
+        return next((name for name in reversed(once) if name in self.mirrors.targets), None)
+
     @cached_property
     def mutual_visibility(self) -> MutualVisibility:
         """Mutual visibility of the facets: the same for all antennas, in echo and uplinks."""

@@ -17,8 +17,8 @@ from simulator.specular.image_sources import DIRECT, Leg, legs_within_reach
 from simulator.specular.ray_launching import launched_sequences
 
 LARGEST_TARGET = 0.5
-"""Longest side of a body that is divided into facets for echoes over mirrors; faces of larger
-bodies are mirrors. [m]"""
+"""Longest side of a body of flat faces that is cut into facets where it is seen over mirrors;
+larger ones are mirrors themselves, and curved ones are cut whatever their size. [m]"""
 
 MOST_LAUNCHED = 200_000
 """Most legs that launched rays may find: tracing one takes some 0.3 ms for each user. [-]"""
@@ -88,13 +88,18 @@ def scene_mirrors(
     if most > 1 or mirrored:
         through = np.array([owner in passing for owner in owners], dtype=bool)
         chains = _chains(mirrors, groups, most, through)
-    targets = [name for name in scenario.objects if longest_side(scenario, name) <= LARGEST_TARGET]
     return SceneMirrors(
         mirrors=mirrors,
         owners=owners,
         legs=tuple(leg for leg in chains if leg.bounces < most),
         chains=chains,
-        targets=tuple(name for name in targets if name not in mirrored),
+        targets=tuple(
+            name
+            for name, body in scenario.objects.items()
+            if not isinstance(body, Plate)
+            and name not in mirrored
+            and (not len(parts[name]) or longest_side(scenario, name) <= LARGEST_TARGET)
+        ),
         mirrored=mirrored,
     )
 

@@ -46,6 +46,7 @@ class Chain:
     cosines: Float[np.ndarray, "paths bounces"]  # of the angles of incidence [-]
     directions: Float[np.ndarray, "paths legs 3"]  # unit vectors of travel, bounces + 1 legs
     crossed: Int[np.ndarray, "paths legs"] | None = None  # sets of slabs on each leg; None: none
+    bent_at: int | None = None  # bounce that reflects as the mirror between its legs; None: none
 
     @property
     def departures(self) -> Float[np.ndarray, "paths 3"]:
@@ -190,7 +191,7 @@ def unfolded_chain(
     """
     unfolded = receivers - images if paired else (receivers - images[:, None]).reshape(-1, 3)
     lengths = np.sqrt(dot(unfolded, unfolded))
-    directions, cosines = _folded_back(mirrors, sequence, unfolded / lengths[:, None])
+    directions, cosines = folded_back(mirrors, sequence, unfolded / lengths[:, None])
     return Chain(
         mirrors=sequence,
         valid=np.eye(len(images), dtype=bool)
@@ -203,7 +204,7 @@ def unfolded_chain(
     )
 
 
-def _folded_back(
+def folded_back(
     mirrors: Mirrors, sequence: tuple[int, ...], last: Float[np.ndarray, "paths 3"]
 ) -> tuple[Float[np.ndarray, "paths legs 3"], Float[np.ndarray, "paths bounces"]]:
     """Directions of all legs, and cosines of incidence, from the directions of the last leg."""
@@ -311,7 +312,7 @@ def _trace(
     last = images[-1] if sequence else sources
     unfolded = receivers[receiver] - last[source]
     lengths = np.linalg.norm(unfolded, axis=-1)
-    directions, cosines = _folded_back(mirrors, sequence, unfolded / lengths[:, None])
+    directions, cosines = folded_back(mirrors, sequence, unfolded / lengths[:, None])
     return Chain(
         mirrors=sequence,
         valid=valid,

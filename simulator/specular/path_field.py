@@ -101,7 +101,10 @@ def _field(
     field, vectors = _past(legs[0], directions[:, 0], lengths, frequencies, field, vectors)
     for bounce, mirror in enumerate(chain.mirrors):
         inward, outward = directions[:, bounce], directions[:, bounce + 1]
-        across = _across(inward, mirrors.normals[mirror])
+        normals = mirrors.normals[mirror]
+        if bounce == chain.bent_at:
+            normals = _between(inward, outward, normals)
+        across = _across(inward, normals)
         within = np.cross(inward, across)
         te, tm = _project(field, vectors, across), _project(field, vectors, within)
         cosines = chain.cosines[some, bounce]
@@ -205,14 +208,25 @@ def _by_slabs(
         yield np.flatnonzero(kind.ravel() == index), tuple(slabs.crossings(one) for one in sets)
 
 
+def _between(
+    inward: Float[np.ndarray, "paths 3"],
+    outward: Float[np.ndarray, "paths 3"],
+    normal: Float[np.ndarray, " 3"],
+) -> Float[np.ndarray, "paths 3"]:
+    """Return the normals of the mirrors that would lead from one leg to the next."""
+    turned = outward - inward
+    length = np.linalg.norm(turned, axis=-1, keepdims=True)
+    return np.where(length > PARALLEL, turned / np.maximum(length, PARALLEL), normal)
+
+
 def _across(
-    inward: Float[np.ndarray, "paths 3"], normal: Float[np.ndarray, " 3"]
+    inward: Float[np.ndarray, "paths 3"], normal: Float[np.ndarray, "*#paths 3"]
 ) -> Float[np.ndarray, "paths 3"]:
     """Return unit vectors across the plane of incidence; at normal incidence any in the mirror."""
     across = np.cross(inward, normal)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
-    substitute = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    substitute /= np.linalg.norm(substitute)
+    substitute = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=-1)])
+    substitute /= np.linalg.norm(substitute, axis=-1, keepdims=True)
     # Below, the cross product's direction is rounding, and not needed: TE and TM agree.
     return np.where(length > PARALLEL, across / np.maximum(length, PARALLEL), substitute)
 

@@ -9,6 +9,7 @@ from .canonical_scatterers import (
     sphere_series,
 )
 from .line_source_scattering import cylinder_field, slab_fields, wedge_field
+from .plates_in_turn import over_plates, plate_cells
 from .point_scatterer import complex_noise, point_echo, point_uplink
 from .rough_plate import Antennas, coherent_loss, mean_diffuse_power, mirror_link
 from .sionna_paths import (
@@ -35,6 +36,8 @@ __all__ = [
     "mean_specular_field",
     "mirror_link",
     "our_paths",
+    "over_plates",
+    "plate_cells",
     "plate_cross_section",
     "plate_facets",
     "point_echo",

@@ -163,7 +163,8 @@ def test_a_corner_of_two_walls_returns_the_antennas_image() -> None:
     one_way = wavelengths / (4 * np.pi * lengths[:, None])
     expected = one_way * np.exp(-2j * np.pi * lengths[:, None] / wavelengths)
     # Left first and right first, each by half; two reflections of a conductor cancel in sign.
-    assert error(found, expected) <= 1e-9
+    # Of the faces' far edges, each v = 3.8 Fresnel widths off: 1/(√2 π v), 6 % of the field.
+    assert error(found, expected) <= 0.15
 
 
 def test_a_pilot_over_two_mirrors_travels_as_from_the_image_of_the_image() -> None:
@@ -192,7 +193,8 @@ def test_a_pilot_over_two_mirrors_travels_as_from_the_image_of_the_image() -> No
     lengths = np.linalg.norm(made.elements - image, axis=-1)[:, None]
     wavelengths = speed_of_light / scenario.radio.frequencies
     expected = wavelengths / (4 * np.pi * lengths) * np.exp(-2j * np.pi * lengths / wavelengths)
-    assert error(over_two, expected) <= 1e-6
+    # Of the edges of the smaller mirror, some 4 Fresnel widths off: 6 % of the field each.
+    assert error(over_two, expected) <= 0.2
 
 
 @pytest.mark.slow

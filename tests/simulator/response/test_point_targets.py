@@ -3,7 +3,9 @@ import pytest
 from scipy.constants import speed_of_light
 
 from scenes.files.loading import load_scenario
-from scenes.scenario import ScenarioError
+from scenes.scenario import ScenarioError, parse_scenario
+from simulator.response.point_targets import point_echo as point_echo_of
+from simulator.scene.radio_scene import radio_scene
 from simulator.simulation import simulate
 from validation.analytic.point_scatterer import point_echo
 
@@ -25,6 +27,33 @@ def test_points_echo_as_the_radar_equation_says() -> None:
     np.testing.assert_allclose(
         echo.samples, expected.samples, rtol=0, atol=1e-11 * np.abs(expected.samples).max()
     )
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_point_over_a_wall_is_a_point_behind_it(dimensions: int) -> None:
+    """Out and back directly, over the wall one way, and over it both ways."""
+    flat = dimensions == 2
+    place = [0.3, 0.4] if flat else [0.3, 0.4, 0.1]
+    wall = {"kind": "plate", "material": "metal", "centre_m": [0.0, 1.0], "length_m": 3.0}
+    scenario = parse_scenario(
+        {
+            "name": "points", "dimensions": dimensions, "waves": "spherical", "max_bounces": 2,
+            "radio": {"start_ghz": 9.9, "stop_ghz": 10.1, "points": 3},
+            "base_station": {"elements": 2 if flat else [2, 1], "spacing_mm": 10.0},
+            "objects": {"wall": wall if flat else wall | {"height_m": 3.0}},
+            "points": {"ball": {"position_m": place, "rcs_m2": 0.01}},
+        }
+    )  # fmt: skip
+    found = point_echo_of(radio_scene(scenario, seed=0, sample=0))
+    array, ball = scenario.base_station.element_positions, scenario.points["ball"].position
+    image = np.array([ball[0], 2.0 - ball[1], ball[2]])
+    wavelengths = speed_of_light / scenario.radio.frequencies
+    one_way = []
+    for end, sign in ((ball, 1.0), (image, -1.0)):  # a conductor turns the field round
+        lengths = np.linalg.norm(array - end, axis=-1)[:, None]
+        one_way.append(sign * np.exp(-2j * np.pi * lengths / wavelengths) / lengths)
+    expected = 0.1 * wavelengths / (4 * np.pi) ** 1.5 * (one_way[0] + one_way[1]) ** 2
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_point_behind_a_screen_is_silent() -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from scenes.scenario import Scenario, parse_scenario
 from simulator.scene.left_out import (
-    bodies_not_seen_over_walls,
     effects_told,
     left_out,
     model_lines,
@@ -58,17 +57,3 @@ def test_effects_that_are_off_are_told_with_the_level_they_would_have() -> None:
     assert not any(one.what == through.what for one in left_out(scene({"pane": pane})))
     told = model_told(off)
     assert "transmission through slabs" in next(iter(model_lines(told)))
-
-
-def test_a_column_too_large_for_ghosts_is_named() -> None:
-    wall = {
-        "kind": "plate", "material": "metal", "centre_m": [0.0, 3.0, 0.0], "length_m": 2.0,
-        "height_m": 2.0,
-    }  # fmt: skip
-    for radius, names in ((0.2, ()), (0.3, ("post",))):
-        post = {
-            "kind": "cylinder", "material": "metal", "centre_m": [1.0, 1.0, 0.0],
-            "radius_m": radius, "height_m": 0.45,
-        }  # fmt: skip
-        room = scene({"wall": wall, "post": post}, dimensions=3, max_bounces=3)
-        assert bodies_not_seen_over_walls(room) == names
