@@ -78,7 +78,9 @@ def coherent_echo(
     flat = [
         leg.sequence
         for leg in among.chains
-        if among.by_images(leg) and scene.facet_target(leg.sequence) is None
+        if leg.bounces <= scene.scenario.max_bounces
+        and among.by_images(leg)
+        and scene.facet_target(leg.sequence) is None
     ]
     return np.asarray(echo + over_flat_faces(scene, flat, send, receive))
 
@@ -111,7 +113,9 @@ def coherent_pilot(
     flat = [
         leg.sequence[::-1]
         for leg in among.chains
-        if among.by_images(leg) and scene.facet_target(leg.sequence) is None
+        if leg.bounces <= scene.scenario.max_bounces
+        and among.by_images(leg)
+        and scene.facet_target(leg.sequence) is None
     ]
     return np.asarray(pilot + over_flat_faces(scene, flat, sender, receive))
 

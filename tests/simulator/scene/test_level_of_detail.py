@@ -66,8 +66,8 @@ def test_a_large_smooth_wall_reflects_like_the_image_of_the_user_without_a_facet
         phase = -2j * np.pi * frequencies * length[:, None] / speed_of_light
         fields = _fields(apart / length[:, None], along)
         expected += level * fields[:, None] * np.exp(phase)
-    # Rounding: 10 m are 2000 wavelengths, whose phase in double precision is known to 1e-12.
-    np.testing.assert_allclose(pilot, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    # The wall's edges, v = 117 Fresnel widths off, leave 1/(√2 π v) each.
+    np.testing.assert_allclose(pilot, expected, rtol=0, atol=4 * 0.002 * np.abs(expected).max())
 
 
 def _fields(ways: np.ndarray, along: np.ndarray) -> np.ndarray:
@@ -87,7 +87,8 @@ def test_the_echo_of_a_large_smooth_wall_is_the_antennas_own_image() -> None:
     assert echo is not None
     level = speed_of_light / hall.radio.frequencies / (4 * np.pi * 10.0)
     phase = np.exp(-2j * np.pi * hall.radio.frequencies * 10.0 / speed_of_light)
-    np.testing.assert_allclose(echo.samples, np.tile(-level * phase, (3, 1)), rtol=1e-9)
+    # Of the wall's edges, v = 126 and more Fresnel widths off.
+    np.testing.assert_allclose(echo.samples, np.tile(-level * phase, (3, 1)), rtol=4 * 0.002)
 
 
 def test_facets_and_images_agree_up_to_what_the_edges_scatter(
