@@ -141,7 +141,11 @@ def default_angles(
 
 
 def default_path_lengths(
-    uplink: Uplink, *, longest: float | None = None, cells: float = SAMPLES
+    uplink: Uplink,
+    *,
+    centre: Float[np.ndarray, " 3"] | None = None,
+    longest: float | None = None,
+    cells: float = SAMPLES,
 ) -> Float[np.ndarray, " ranges"]:
     """Sample path lengths from one cell up to the unambiguous path c/Δf.
 
@@ -149,6 +153,8 @@ def default_path_lengths(
     ----------
     uplink
         Pilot whose frequencies set cell and limit.
+    centre
+        Where lengths are counted from; ``None``: the mean of the elements. [m]
     longest
         A shorter limit. [m]
     cells
@@ -168,8 +174,9 @@ def default_path_lengths(
         raise MeasurementError(
             "frequency: one point has no bandwidth; range needs at least two frequencies"
         )
-    # The far half aperture is farther away than the centre, and must be in range as well.
-    size = np.linalg.norm(uplink.positions - uplink.positions.mean(axis=0), axis=1).max()
+    # Elements beyond the centre are farther away than it, and must be in range as well.
+    middle = uplink.positions.mean(axis=0) if centre is None else centre
+    size = np.linalg.norm(uplink.positions - middle, axis=1).max()
     limit = unambiguous_path(frequencies) - float(size)
     end = limit if longest is None else min(longest, limit)
     step = HALF_POWER * speed_of_light / float(frequencies[-1] - frequencies[0]) / cells

@@ -2,6 +2,7 @@ from .bearing import Bearing
 from .bearing_2d import LINEAR
 from .bearing_3d import PLANAR
 from .flat_wall import FlatWall
+from .lateness import Lateness, combined
 from .path_covariance import input_covariance, polar_slopes, rests_on
 from .path_tracing import Projection, project, trace
 from .specular_chains import Chain, chain_to, image_over, seen_over, unfolded, unfolded_over
@@ -16,10 +17,12 @@ __all__ = [
     "Bearing",
     "Chain",
     "FlatWall",
+    "Lateness",
     "PlaneWall",
     "Projection",
     "Wall",
     "chain_to",
+    "combined",
     "crossing",
     "hidden_by",
     "image_over",

@@ -7,8 +7,15 @@ measures in space: only the stages that image, map and fit differ.
 import time
 from dataclasses import replace
 
+import numpy as np
+
 from estimator.array.planar_array import is_flat, spans_a_plane
 from estimator.array.viewpoint import viewpoint
+from estimator.channel.path import PathSet
+from estimator.consistency.doubt import Doubted, doubted
+from estimator.consistency.pilot_curvature import pilot_lateness
+from estimator.consistency.same_samples import refuse_same_samples
+from estimator.consistency.stated_heights import height_error
 from estimator.imaging.energy_region import middles
 from estimator.localization.clock import clock_note, on_our_clock
 from estimator.localization.close_up import close_up
@@ -17,11 +24,19 @@ from estimator.localization.stages import MappedRoom, Stages
 from estimator.localization.stages_2d import LinearStages
 from estimator.localization.stages_3d import PlanarStages
 from estimator.localization.stages_free import FreeStages
-from estimator.measurement.model import Echo, Measurement, frequency_step
+from estimator.measurement.model import Echo, Measurement, Uplink, frequency_step
 from estimator.positioning.decision_rules import decide
-from estimator.positioning.map_context import no_image
+from estimator.positioning.map_context import MapContext, no_image
 from estimator.results.deferred import Deferred
-from estimator.results.estimate import AngleRangeMap, DirectionMap, Estimate, Images, Progress
+from estimator.results.estimate import (
+    AngleRangeMap,
+    Check,
+    DirectionMap,
+    Estimate,
+    Images,
+    Progress,
+    UserEstimate,
+)
 
 
 def _stages(
@@ -73,6 +88,9 @@ def locate(
     clock_known = measurement.clock_offset is not None
     echo, uplinks = measurement.echo, on_our_clock(measurement)
     frequency_step(measured.frequencies)  # refused before any work
+    if echo is not None:
+        for uplink in uplinks:
+            refuse_same_samples(echo, uplink)
     frame = stages.frame(measurement)
     steps = 2 + len(uplinks)
 
@@ -88,6 +106,7 @@ def locate(
     tell("estimate", 1, steps)
 
     users, charts, looked = [], [], []
+    checks: tuple[Check, ...] = ()
     for index, uplink in enumerate(uplinks):
         started = time.perf_counter()
         local = local_uplink(uplink, frame)
@@ -96,6 +115,8 @@ def locate(
         found = decide(uplink.user, heard.paths, context, clock_known=clock_known)
         if room is not None and clock_known:
             found = room.refined(found, local)
+        compared = _compared(found, heard.paths, context, local, clock_known=clock_known)
+        found, checks = compared.user, (*checks, *compared.checks)
         notes += clock_note(found)
         users.append(user_in_world(found, frame))
         charts.append(heard.chart)
@@ -125,8 +146,33 @@ def locate(
         maps=tuple(chart for chart in charts if isinstance(chart, AngleRangeMap)),
         direction_maps=tuple(chart for chart in charts if isinstance(chart, DirectionMap)),
         notes=tuple(notes),
+        checks=checks,
         timings=timings,
     )
     if not images:
         return estimate
     return replace(estimate, images=Deferred(formed), close_up_maps=Deferred(closer))
+
+
+def _compared(
+    found: UserEstimate,
+    paths: PathSet,
+    context: MapContext,
+    uplink: Uplink,
+    *,
+    clock_known: bool,
+) -> Doubted:
+    """Hold the delays that an answer rests on against curvatures."""
+    if found.method != "paths":
+        return Doubted(user=found, checks=())
+    used = [index for index, path in enumerate(found.paths) if path.used]
+    flat = len(paths.how.coordinates) == 2
+    return doubted(
+        found,
+        # An unknown clock is solved for: its delays are no lengths.
+        pilot=pilot_lateness(paths, used) if clock_known else None,
+        echo=context.late,
+        height_error=height_error(uplink, found.path_length or 0.0) if flat else 0.0,
+        bandwidth=float(np.ptp(uplink.frequencies)),
+        axes=paths.how.coordinates,
+    )

@@ -15,6 +15,7 @@ from estimator.channel.angle_range_map_2d import (
     default_path_lengths,
 )
 from estimator.channel.path_extraction_2d import find_paths
+from estimator.geometry.lateness import combined
 from estimator.imaging.look_aside_2d import peaks_aside
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes, range_notes
@@ -60,6 +61,7 @@ class LinearRoom:
             reach=echo_reach(self.echo)[1],
             widest=imaged_sine(self.echo),
             contrast=self.map.survey.contrast,
+            late=combined([line.late for line in self.map.lines if line.late is not None]),
             aside=self._aside,
         )
 
@@ -124,7 +126,7 @@ class LinearStages:
         chart = angle_range_map(
             uplink,
             aoa=default_angles(uplink, cells=MAP_SAMPLES),
-            path_length=default_path_lengths(uplink, cells=MAP_SAMPLES),
+            path_length=default_path_lengths(uplink, centre=np.zeros(3), cells=MAP_SAMPLES),
             centre=np.zeros(3),
         )
         return Heard(chart=chart, paths=find_paths(uplink, chart, clock_known=clock_known))

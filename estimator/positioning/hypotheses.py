@@ -15,7 +15,12 @@ from estimator.channel.path import Path, PathSet
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.specular_chains import Chain
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.weighted_least_squares import Consensus, Sighting, solve_position
+from estimator.positioning.weighted_least_squares import (
+    Consensus,
+    Sighting,
+    UndeterminedPlaceError,
+    solve_position,
+)
 
 Chains = dict[int, tuple[Chain, ...]]
 """For each path the chains of mirrors it may come over, the one that its ray meets first."""
@@ -45,15 +50,18 @@ def consistent_ones(
     for choice in product(*choices):
         sightings = [one for one in choice if one is not None]
         if sightings and len({one.chain for one in sightings}) == len(sightings):
-            solved = solve_position(
-                sightings,
-                found.observed if clock_known else found.free_observed,
-                found.covariance if clock_known else found.free_covariance,
-                room.walls,
-                room.wall_covariance,
-                how=found.how,
-                clock_known=clock_known,
-            )
+            try:
+                solved = solve_position(
+                    sightings,
+                    found.observed if clock_known else found.free_observed,
+                    found.covariance if clock_known else found.free_covariance,
+                    room.walls,
+                    room.wall_covariance,
+                    how=found.how,
+                    clock_known=clock_known,
+                )
+            except UndeterminedPlaceError:
+                continue
             if solved.agrees:
                 consistent.append(solved)
     return consistent

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from estimator.array.resolution_cell import Resolution
 from estimator.geometry.flat_wall import FlatWall
+from estimator.geometry.lateness import Lateness
 from estimator.geometry.wall_2d import Wall
 from estimator.geometry.wall_3d import PlaneWall
 
@@ -30,6 +31,8 @@ class MapContext:
     reach: float  # how far the image shows what there is [m]
     widest: float  # sine of the angle from boresight, along each axis, to which it does [-]
     contrast: float  # intensity of the brightest in the image over its background [-]
+    late: Lateness | None = None
+    """By how much the walls' echoes are later than they are curved; None where nothing tells."""
     aside: LookAside | None = None
     """Looks for what stands around a direction that the image does not show, if that can be."""
 

@@ -23,7 +23,7 @@ from estimator.positioning.hypotheses import (
 )
 from estimator.positioning.known_clock import on_our_clock
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.position_report import ambiguous, placed
+from estimator.positioning.position_report import ambiguous, path_reports, placed
 from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
@@ -41,6 +41,14 @@ def on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
         index: _chains(path.radius, path, room, found.how) for index, path in enumerate(found.paths)
     }
     consistent = consistent_ones(chains, found, room, clock_known=False)
+    if not consistent:
+        return UserEstimate(
+            name=name,
+            status="not_found",
+            reason="the user's clock offset is unknown, and the waves are too flat to tell how far "
+            "away it is",
+            paths=path_reports(found, (), chains),
+        )
     best = _most_explained(consistent, found, chains)
     answer = placed(name, best, found, room, chains)
     if len(best.sightings) > 1:

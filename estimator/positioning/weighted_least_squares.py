@@ -38,6 +38,14 @@ FLATTEST = 1e-3
 """Least curvature from which a search for a user's place is begun: a kilometre, beyond any room.
 [1/m]"""
 
+MOST_CONDITION = 1e7
+"""Condition number of the weighted slopes from which a place is not told: its square is what
+float64 inverts with two digits left. [-]"""
+
+
+class UndeterminedPlaceError(ArithmeticError):
+    """The observations leave a coordinate, or the clock, open: a plane wave on an unknown clock."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sighting:
@@ -97,6 +105,11 @@ def solve_position(
         What the array measures of a direction.
     clock_known
         Whether a delay is a length.
+
+    Raises
+    ------
+    UndeterminedPlaceError
+        If the paths leave the place open.
     """
     kinds = observed.shape[1]
     angles = kinds - (1 if clock_known else 2)
@@ -130,6 +143,8 @@ def solve_position(
             unknowns = unknowns + step
             if np.linalg.norm(step) < CONVERGED:
                 break
+    if np.linalg.cond(weighted) > MOST_CONDITION:
+        raise UndeterminedPlaceError("the paths' bearings, lengths and curvatures do not tell it")
     spread = np.linalg.inv(weighted.T @ weighted)
     square = np.zeros((3, 3))
     square[np.ix_(axes, axes)] = spread[: len(axes), : len(axes)]

@@ -1,6 +1,7 @@
 from .deferred import Deferred
 from .estimate import (
     AngleRangeMap,
+    Check,
     CorrectedImage,
     DirectionMap,
     Estimate,
@@ -16,6 +17,7 @@ from .pixel_grid import PixelGrid
 
 __all__ = [
     "AngleRangeMap",
+    "Check",
     "CorrectedImage",
     "Deferred",
     "DirectionMap",

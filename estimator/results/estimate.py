@@ -125,6 +125,18 @@ class UserEstimate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Check:
+    """What a measurement tells twice, compared: delays and curvatures of the same waves."""
+
+    user: str  # whose answer rests on it
+    data: Literal["echo", "pilot"]
+    shift: float  # by which the waves are later than their curvature says, one way [m]
+    deviation: float  # [m]
+    agrees: bool
+    text: str  # what that is, and what would mend it
+
+
+@dataclass(frozen=True, kw_only=True)
 class Images:
     """The raw and the corrected image; without an echo there is neither."""
 
@@ -155,6 +167,7 @@ class Estimate:
     )
     direction_maps: tuple[DirectionMap, ...] = ()  # one for each user of a planar array
     notes: tuple[str, ...] = ()  # what was assumed or could not be done
+    checks: tuple[Check, ...] = ()  # what the data tell twice, compared
     timings: dict[str, float] = field(default_factory=dict)  # stage → duration [s]
     aperture: Float[np.ndarray, "positions 3"] | None = None  # that it was made from [m]
 

@@ -63,7 +63,36 @@ def cluster_robust_covariance(
     numpy.linalg.LinAlgError
         If the normal matrix is singular.
     """
-    normal = designs.T @ gains
+    return sandwich(
+        places,
+        scores[:, None] * designs,
+        designs[:, :, None] * gains[:, None, :],
+        normal=designs.T @ gains,
+        part=part,
+    )
+
+
+def sandwich(
+    places: Float[np.ndarray, " places"],
+    scores: Float[np.ndarray, "places parameters"],
+    gains: Float[np.ndarray, "places parameters parameters"],
+    *,
+    normal: Float[np.ndarray, "parameters parameters"],
+    part: float,
+) -> Float[np.ndarray, "parameters parameters"]:
+    """Return the covariance of parameters from each place's share of their scores.
+
+    Parameters
+    ----------
+    places, part
+        As for :func:`cluster_robust_covariance`.
+    scores
+        Each place's share of the derivatives by the parameters.
+    gains
+        Each place's share of the normal matrix.
+    normal
+        The normal matrix: their sum.
+    """
     values, vectors = np.linalg.eigh(np.linalg.inv(0.5 * (normal + normal.T)))
     root = (vectors * np.sqrt(values)) @ vectors.T
     count = max(FEWEST_PARTS, int((places[-1] - places[0]) / part + TIE))
@@ -71,8 +100,8 @@ def cluster_robust_covariance(
     covariance = np.zeros_like(root)
     for shift in (0.0, 0.5):
         first = _first_of_parts(np.minimum(position + shift, count + shift - 2 * TIE))
-        pushed = np.add.reduceat(scores[:, None] * designs, first)
-        held = np.add.reduceat(designs[:, :, None] * gains[:, None, :], first)
+        pushed = np.add.reduceat(scores, first)
+        held = np.add.reduceat(gains, first)
         shares, axes = np.linalg.eigh(root @ (0.5 * (held + held.swapaxes(1, 2))) @ root)
         left = np.maximum(1 - shares, LEAST_LEFT)
         steps = np.einsum("bij,bj,bkj,bk->bi", axes, left**-0.5, axes, pushed @ root)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from estimator.geometry.lateness import Lateness
 from estimator.geometry.wall_2d import unit_normal
 
 
@@ -19,6 +20,8 @@ class FittedLine:
     background: float  # mean intensity beside it [-]
     confidence: float  # one minus the probability that background alone does this
     explained: float = 1.0  # share of its echo that a row of scatterers explains, if examined [-]
+
+    late: Lateness | None = None  # by how much its echo is later than curved, if that was found
 
     @property
     def middle(self) -> Float[np.ndarray, " 3"]:

@@ -29,9 +29,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cho_solve
 
+from estimator.geometry.lateness import Lateness
 from estimator.geometry.wall_2d import unit_normal
 from estimator.measurement.model import Echo
 from estimator.walls.cluster_robust_covariance import cluster_robust_covariance
+from estimator.walls.row_focus import focus_shift
 from estimator.walls.scatterer_row import (
     adjoint,
     factorized,
@@ -67,6 +69,7 @@ class CoherentLine:
     end: Float[np.ndarray, " 3"]  # [m]
     covariance: Float[np.ndarray, "2 2"]  # of (angle [rad], offset [m]) at the midpoint
     explained: float  # share of the echo from its ranges that it and the others explain [-]
+    late: Lateness  # by how much that echo is later than its wavefronts are curved
 
 
 def fit_coherently(
@@ -142,7 +145,11 @@ def fit_coherently(
     covariance = to_angle @ by_step @ to_angle.T
     covariance[1, 1] += DEPTH**2
     explained = 1 - float(np.vdot(residual, residual).real / np.vdot(data, data).real)
-    return CoherentLine(start=start, end=end, covariance=covariance, explained=explained)
+    late = focus_shift(
+        few, profiles, row, echoes, solved, slopes, moved, residual, strengths,
+        places=places, levers=levers, part=PART * cell_along,
+    )  # fmt: skip
+    return CoherentLine(start=start, end=end, covariance=covariance, explained=explained, late=late)
 
 
 def _moved(

@@ -121,7 +121,8 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
     if found.explained < EXPLAINED and _deviations(line, found) > MOST_DEVIATIONS:
         return line
     covariance = found.covariance * _excess(line, found)
-    return replace(line, start=found.start, end=found.end, covariance=covariance)
+    late = found.late if found.explained >= EXPLAINED else None
+    return replace(line, start=found.start, end=found.end, covariance=covariance, late=late)
 
 
 def _change(line: FittedLine, moved: CoherentLine) -> Float[np.ndarray, " 2"]:

@@ -176,9 +176,17 @@ def row_echoes(
     normal: Float[np.ndarray, " 3"],
 ) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
     """Return each scatterer's range profiles, and how they change along a normal [1/m]."""
-    return point_profiles(
-        _sweep(echo), profiles.ranges, _ranges(echo, points), _range_slopes(echo, points, normal)
-    )
+    return row_echoes_by(echo, profiles, points, _range_slopes(echo, points, normal))
+
+
+def row_echoes_by(
+    echo: Echo,
+    profiles: RowProfiles,
+    points: Float[np.ndarray, "points 3"],
+    rates: Float[np.ndarray, "positions points"],
+) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
+    """Return each scatterer's range profiles, and how they change at rates of their ranges."""
+    return point_profiles(_sweep(echo), profiles.ranges, _ranges(echo, points), rates)
 
 
 def adjoint(

@@ -72,13 +72,13 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
 
     step = cell / SAMPLES_PER_CELL
     reach = HALF_CELLS * cell
-    gate = half + reach + GATE_CELLS * cell
+    gate = float(np.linalg.norm(uplink.positions, axis=1).max()) + reach + GATE_CELLS * cell
     profiles, first = _gated_profiles(uplink, path_length, gate, step)
     shifts = np.arange(-HALF_CELLS * SAMPLES_PER_CELL, HALF_CELLS * SAMPLES_PER_CELL + 1)
     best = (-1.0, 0, 0, 0)
     for i, bend in enumerate(bends):
         # r_m − R_c for a source at radius 1/bend, exact and finite for a plane wave too.
-        excess = _excess(across, cosines, float(bend))
+        excess = _excess(uplink.positions, cosines, float(bend))
         places = (path_length + excess - first) / step
         cells = np.round(places).astype(int)
         # Within a sample only the carrier's phase turns.
@@ -97,10 +97,11 @@ def search_curvature(uplink: Uplink, *, aoa: float, path_length: float) -> Start
 
 
 def _excess(
-    across: Float[np.ndarray, " elements"], cosines: Float[np.ndarray, " angles"], bend: float
+    positions: Float[np.ndarray, "elements 3"], cosines: Float[np.ndarray, " angles"], bend: float
 ) -> Float[np.ndarray, "angles elements"]:
-    r"""Return :math:`\sqrt{R^2 - 2 R x \cos\theta + x^2} - R` without cancellation. [m]."""
-    square = bend * across**2 - 2 * np.outer(cosines, across)
+    r"""Return :math:`\lVert R \hat s - q \rVert - R` without cancellation. [m]."""
+    towards = np.stack([cosines, np.sqrt(1 - cosines**2)], axis=-1)
+    square = bend * (positions**2).sum(axis=1) - 2 * towards @ positions[:, :2].T
     excess: np.ndarray = square / (1 + np.sqrt(1 + bend * square))
     return excess
 

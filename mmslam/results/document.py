@@ -10,7 +10,7 @@ import numpy as np
 
 from estimator.compute import engine
 from estimator.measurement.model import Measurement
-from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
+from estimator.results.estimate import Check, Estimate, Mirror, Target, UserEstimate
 from mmslam.own_results import FORMAT
 from mmslam.plain_text import json_text
 from validation.metrics.errors import WallError, position_error, wall_errors
@@ -77,6 +77,7 @@ def result_document(
                 set(truth.wall_start) - {error.wall for error in errors if error is not None}
             ),
         },
+        "checks": [_check(check) for check in estimate.checks],
         "notes": estimate.notes,
         "timings_s": {**(timings or {}), **estimate.timings},
     }
@@ -113,6 +114,17 @@ def dimensions(measurement: Measurement) -> int:
     )
     sizes = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     return 2 if len(sizes) < 2 or sizes[1] <= _FLATNESS * sizes[0] else 3
+
+
+def _check(check: Check) -> dict[str, Any]:
+    return {
+        "user": check.user,
+        "data": check.data,
+        "late_m": check.shift,
+        "late_deviation_m": check.deviation,
+        "agrees": check.agrees,
+        "text": check.text,
+    }
 
 
 def _user(user: UserEstimate, truth: Truth) -> dict[str, Any]:

@@ -14,7 +14,12 @@ from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.wall_2d import Wall
 from estimator.geometry.wall_3d import PlaneWall
 from estimator.positioning.map_context import block_covariance
-from estimator.positioning.weighted_least_squares import Consensus, Sighting, solve_position
+from estimator.positioning.weighted_least_squares import (
+    Consensus,
+    Sighting,
+    UndeterminedPlaceError,
+    solve_position,
+)
 from estimator.walls.plane_fit import plane_axes
 
 FLAT: list[FlatWall] = [
@@ -193,3 +198,18 @@ def test_paths_that_contradict_each_other_do_not_agree(kind: str) -> None:
     assert not solved(kind, observed, True, SIGHTINGS[:2]).agrees
     # One path alone always agrees with itself.
     assert solved(kind, observed, True, SIGHTINGS[1:2]).agrees
+
+
+def test_a_plane_wave_on_an_unknown_clock_tells_no_place() -> None:
+    how, walls, _ = ROOMS["plane"]
+    # Curvature 1e-9/m ± 1e-2/m: distance and clock are one and the same unknown.
+    with pytest.raises(UndeterminedPlaceError, match="do not tell it"):
+        solve_position(
+            [Sighting(path=0, chain=())],
+            np.array([[1.2, 0.5, 1e-9]]),
+            np.diag(deviations(how, False) ** 2),
+            walls,
+            block_covariance(walls),
+            how=how,
+            clock_known=False,
+        )

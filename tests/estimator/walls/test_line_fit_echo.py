@@ -1,5 +1,7 @@
 """A wall's line from its whole echo: closed forms of rows of scatterers, and walls of our own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.constants import speed_of_light
@@ -168,3 +170,28 @@ def test_what_is_hardly_longer_than_a_point_has_no_line() -> None:
     echo = _echo(rng, start, end)
     near = start + 4 * CELL / LENGTH * (end - start)
     assert fit_coherently(echo, start, near, cell_along=CELL, cell_across=CELL) is None
+
+
+@pytest.mark.parametrize("cable", [0.0, 3e-11, 1e-10])
+def test_a_cable_left_in_the_echo_is_told_by_the_curvature_of_a_speckled_wall(
+    cable: float,
+) -> None:
+    # Rough, inclined, of unknown strengths: only the defocus within each range cell tells.
+    rng = np.random.default_rng(4)
+    squares = []
+    for angle in (0.6, 0.75, 0.9):
+        start, end = _ends(angle, (0.0, 0.3))
+        echo = _echo(rng, start, end, noise=0.1)
+        echo = replace(echo, samples=echo.samples * np.exp(-2j * np.pi * FREQUENCIES * cable))
+        shift = 0.5 * cable * speed_of_light
+        # Imaged too far away along the rays, which the fit starts from.
+        ends = [place * (1 + shift / np.linalg.norm(place)) for place in (start, end)]
+        line = _fit(echo, *ends)
+        assert line is not None
+        squares.append(((line.late.shift - shift) / line.late.deviation) ** 2)
+        # A millimetre, and a tenth of the shift for the one step.
+        assert line.late.deviation < 1e-3 + 0.1 * abs(line.late.shift)
+        if cable:
+            assert line.late.shift > 3.3 * line.late.deviation
+    # Three walls: of Gaussian errors one in 300 has one beyond 3.3 deviations.
+    assert np.sqrt(np.max(squares)) < 3.3

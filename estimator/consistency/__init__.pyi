@@ -1,0 +1,6 @@
+from .doubt import Doubted, doubted
+from .pilot_curvature import pilot_lateness
+from .same_samples import refuse_same_samples
+from .stated_heights import height_error
+
+__all__ = ["Doubted", "doubted", "height_error", "pilot_lateness", "refuse_same_samples"]
