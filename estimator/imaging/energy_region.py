@@ -15,7 +15,7 @@ from scipy.constants import speed_of_light
 
 from estimator import false_alarm
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
-from estimator.imaging.backprojection import focus, prepare
+from estimator.imaging.backprojection import Focuser, focus, prepare
 from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.range_compression import range_profiles, repeated, unambiguous_path
 from estimator.measurement.model import Echo
@@ -114,9 +114,16 @@ def focused(
     echo: Echo, points: Float[np.ndarray, "*n 3"], weights: Float[np.ndarray, "positions freqs"]
 ) -> Complex[np.ndarray, "*n"]:
     """Back-project onto points also beyond the unambiguous range, which repeats there."""
+    return focus(focuser_for(echo, points, weights), points)
+
+
+def focuser_for(
+    echo: Echo, points: Float[np.ndarray, "*n 3"], weights: Float[np.ndarray, "positions freqs"]
+) -> Focuser:
+    """Prepare range profiles that are focused on any points no farther than these, several times."""
     profiles = range_profiles(echo, weights=weights)
     longest = 1.001 * _longest(echo, points) + 2 * profiles.cell
-    return focus(prepare(repeated(profiles, longest)), points)
+    return prepare(repeated(profiles, longest))
 
 
 def energy_box(
@@ -171,7 +178,7 @@ def energy_box(
 def _within_range(echo: Echo, nearest: float | None, farthest: float | None) -> tuple[float, Box]:
     """Return the nearest range that holds something, and the box that all positions see. [m]."""
     chosen = evenly_chosen(len(echo.positions))
-    part = _some(echo, chosen)
+    part = some_positions(echo, chosen)
     taper = frequency_taper(echo.frequencies, SURVEY_TAPER)[None, :]
     profiles = range_profiles(part, weights=taper)
     intensity = np.abs(profiles.coefficients[..., 0]) ** 2
@@ -195,7 +202,8 @@ def _within_range(echo: Echo, nearest: float | None, farthest: float | None) -> 
     return float(ranges[np.argmax(holds.any(axis=0))]), box
 
 
-def _some(echo: Echo, chosen: np.ndarray, band: slice = slice(None)) -> Echo:
+def some_positions(echo: Echo, chosen: np.ndarray, band: slice = slice(None)) -> Echo:
+    """Take a part of an echo's positions, and of its band."""
     apart = echo.transmit_positions
     return replace(
         echo,
@@ -271,7 +279,7 @@ def _coarse_map(
     edges = np.linspace(0, echo.frequencies.size, bands + 1).astype(int)
     for members in _parts(middles(echo), parts):
         for first, end in pairwise(edges):
-            part = _some(echo, members, slice(first, end))
+            part = some_positions(echo, members, slice(first, end))
             total += np.abs(focused(part, points, survey_weights(part))) ** 2
     return total
 

@@ -1,5 +1,7 @@
 """Targets in one image of a scene near an aperture: what stands out of it, and is no sidelobe."""
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.ndimage
 from jaxtyping import Bool, Complex, Float
@@ -8,7 +10,16 @@ from scipy.spatial import cKDTree
 
 from estimator import false_alarm
 from estimator.array.resolution import largest_spacing
-from estimator.imaging.energy_region import cells_at, evenly_chosen, focused, middles
+from estimator.array.windows import survey_weights
+from estimator.imaging.backprojection import Focuser, focus
+from estimator.imaging.energy_region import (
+    cells_at,
+    evenly_chosen,
+    focused,
+    focuser_for,
+    middles,
+    some_positions,
+)
 from estimator.imaging.peak_detection import peak_shift
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.measurement.model import Echo
@@ -27,8 +38,14 @@ WINDOW = 60
 """Half the side of the neighbourhood of a peak in which its region is followed, for time. Chosen,
 not measured. [pixels]"""
 WIDE = 4.0
-"""Extent from which a target is more than a point, of which the tapered lobe spans 2.7 down to
+"""Extent from which a target may be more than a point, of which the tapered lobe spans 2.7 down to
 :data:`REGION`. [cells]"""
+BROADER = 3.0
+"""Level of a point's own response, over :data:`REGION`, at the ends of a region that a point alone
+explains: with few frequencies it is long in depth, and longer behind the point than before it. It is
+what half a pixel to a cell at either end changes. Chosen, not measured. [-]"""
+RESPONSE = 41
+"""Points along a region at which a point's own response is computed. [-]"""
 SHADOW = 0.1
 """Intensity over a brighter target's of what is out of focus before or behind it, along the same
 ray: with few frequencies the image is long in range, and only its ends are told apart. [-]"""
@@ -91,6 +108,12 @@ def image_targets(
     tops &= ~_rim(intensity.shape)
     places = np.argwhere(tops)
     places = places[np.argsort(-intensity[tops], kind="stable")]
+    if not places.size:
+        return ()
+    corners = np.stack(np.meshgrid(*[axis[[0, -1]] for axis in axes], indexing="ij"), axis=-1)
+    pixel = np.array([axis[1] - axis[0] if axis.size > 1 else 0.0 for axis in axes])
+    reach = np.concatenate([corners.reshape(-1, 3) - 2 * pixel, corners.reshape(-1, 3) + 2 * pixel])
+    focuser = focuser_for(echo, reach, weights)
     taken = np.zeros(intensity.shape, dtype=bool)
     found: list[Target] = []
     levels: list[float] = []
@@ -113,7 +136,7 @@ def image_targets(
             continue
         if found and (_in_shadow(peak, level, found, levels, cells) or not _one_wave(echo, peak)):
             continue  # the strongest is nobody's sidelobe
-        found.append(_target(echo, weights, peak, level, region, intensity, axes, cells))
+        found.append(_target(echo, focuser, peak, level, region, intensity, axes))
         levels.append(level)
     return tuple(found)
 
@@ -222,10 +245,7 @@ def _repeats(
 
 
 def _refined(
-    echo: Echo,
-    weights: Float[np.ndarray, "positions freqs"],
-    peak: Float[np.ndarray, " 3"],
-    pixel: Float[np.ndarray, " 3"],
+    focuser: Focuser, peak: Float[np.ndarray, " 3"], pixel: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, " 3"]:
     """Focus around a maximum ever more finely. [m]."""
     steps = np.linspace(-1.0, 1.0, ZOOM)
@@ -234,33 +254,52 @@ def _refined(
     size = pixel
     for _ in range(ZOOMS):
         tried = peak + offsets * size
-        peak = tried[int(np.argmax(np.abs(focused(echo, tried, weights))))]
+        peak = tried[int(np.argmax(np.abs(focus(focuser, tried))))]
         size = size * 2 / (ZOOM - 1)
     return peak
 
 
 def _target(
     echo: Echo,
-    weights: Float[np.ndarray, "positions freqs"],
+    focuser: Focuser,
     peak: Float[np.ndarray, " 3"],
     level: float,
     region: Bool[np.ndarray, "x y z"],
     intensity: Float[np.ndarray, "x y z"],
     axes: tuple[np.ndarray, ...],
-    cells: Float[np.ndarray, " 3"],
 ) -> Target:
     members = np.argwhere(region)
     points = np.stack([axis[members[:, i]] for i, axis in enumerate(axes)], axis=-1)
     shares = intensity[region] / intensity[region].sum()
-    extents = np.ptp(points, axis=0) / cells
-    if extents.max() < WIDE:
-        pixel = np.array([a[1] - a[0] if a.size > 1 else 0.0 for a in axes])
-        return _point(_refined(echo, weights, peak, pixel), level, None)
     centre = (shares[:, None] * points).sum(axis=0)
     spread = (points - centre) * np.sqrt(shares)[:, None]
     axis = np.linalg.svd(spread, full_matrices=False)[2][0]
     along = (points - centre) @ axis
-    return _point(centre, level, centre + np.array([[along.min()], [along.max()]]) * axis)
+    ends = centre + np.array([[along.min()], [along.max()]]) * axis
+    extents = np.ptp(points, axis=0) / cells_at(echo, peak[None])[0]
+    if extents.max() < WIDE or _looks_so_long(echo, peak, ends):
+        pixel = np.array([a[1] - a[0] if a.size > 1 else 0.0 for a in axes])
+        return _point(_refined(focuser, peak, pixel), level, None)
+    return _point(centre, level, ends)
+
+
+def _looks_so_long(
+    echo: Echo, peak: Float[np.ndarray, " 3"], ends: Float[np.ndarray, "2 3"]
+) -> bool:
+    """Tell whether the aperture shows a single point as long as a region is."""
+    chosen = evenly_chosen(len(echo.positions), MOST_CHANNELS)
+    part = some_positions(echo, chosen)
+    legs = [part.positions]
+    legs.append(legs[0] if part.transmit_positions is None else part.transmit_positions)
+    length = sum(np.linalg.norm(peak - end, axis=1) for end in legs)
+    wave = np.exp(-2j * np.pi / speed_of_light * np.outer(length, part.frequencies))
+    point = replace(part, samples=wave)
+    line = ends[0] + np.linspace(0.0, 1.0, RESPONSE)[:, None] * (ends[1] - ends[0])
+    # The region bends around its axis; the peak itself is the nearest that a straight line passes.
+    nearest = int(np.argmin(np.linalg.norm(line - peak, axis=1)))
+    line += peak - line[nearest]
+    shown = np.abs(focused(point, line, survey_weights(part))) ** 2
+    return bool(min(shown[0], shown[-1]) * BROADER > REGION * shown[nearest])
 
 
 def _point(

@@ -137,3 +137,20 @@ def test_noise_alone_shows_nothing_near_or_far() -> None:
     estimate = located(Echo(samples=samples, positions=scan(), frequencies=BAND))
     assert not estimate.mirrors
     assert not estimate.targets
+
+
+def test_a_point_that_few_frequencies_show_long_in_depth_is_placed_at_its_focus() -> None:
+    band = np.linspace(22e9, 22.5e9, 6)
+    places = np.stack([[0.03, 0.2, 0.03], [-0.03, 0.2, -0.03]])
+    clean = point_echo(
+        places,
+        positions=scan(37, 6.6e-3),
+        frequencies=band,
+        radar_cross_section=np.full(2, 1e-3),
+    )
+    estimate = located(clean)
+    found = np.array([target.position for target in estimate.targets])
+    # 0.03 of the depth's cell of 46 mm (λ/2 over 1 − cos 31°); its long trail is 16 mm behind
+    assert len(found) == 2
+    assert np.abs(found[np.argsort(-found[:, 0])] - places).max() < 1.5e-3
+    assert all(target.ends is None for target in estimate.targets)
