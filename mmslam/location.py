@@ -16,12 +16,22 @@ from mmslam import output, own_results
 from mmslam.measurement import Measurement
 from mmslam.measurement_files import read
 from mmslam.plain_text import file_name
+from mmslam.region import ANY, Bounds, asked_region
 from mmslam.results.document import result_document, to_json
 from mmslam.results.estimate import Estimate
 
 
 def locate(
-    measurement: model.Measurement, *, images: bool = True, progress: Progress | None = None
+    measurement: model.Measurement,
+    *,
+    x: Bounds = ANY,
+    y: Bounds = ANY,
+    z: Bounds = ANY,
+    pixel: float | None = None,
+    min_range: float | None = None,
+    max_range: float | None = None,
+    images: bool = True,
+    progress: Progress | None = None,
 ) -> Estimate:
     """Find walls, targets and users from a measurement alone.
 
@@ -30,6 +40,13 @@ def locate(
     measurement
         Measurement of a linear or a planar array; echo or uplinks may be missing. Its ground truth,
         if any, is not passed to the estimator.
+    x, y, z
+        First and last coordinate of where targets are looked for, in the world's frame: with any of
+        these, or of the next three, that region is imaged, and no walls are looked for. [m]
+    pixel
+        Spacing of its pixels; None: half the finest resolution. [m]
+    min_range, max_range
+        Distances from the positions within which the region is chosen. [m]
     images
         Whether images and enlarged maps are available in the estimate (formed on first access); the
         estimate itself does not need them.
@@ -43,7 +60,8 @@ def locate(
     Raises
     ------
     MeasurementError
-        If the array is neither linear nor planar, or the frequencies are not uniform.
+        If the array is neither linear nor planar and pilots came to it, the frequencies are not
+        uniform, or the region is empty.
 
     Examples
     --------
@@ -62,7 +80,9 @@ def locate(
     True
     """
     seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
-    return Estimate.of(localization.locate(seen, images=images, progress=progress), seen)
+    region = asked_region(x=x, y=y, z=z, pixel=pixel, near=min_range, far=max_range)
+    found = localization.locate(seen, region=region, images=images, progress=progress)
+    return Estimate.of(found, seen)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +94,12 @@ class Outcome:
 
 
 def locate_measurement(
-    path: Path, *, sample: int | None, folder: Path | None, progress: Progress | None = None
+    path: Path,
+    *,
+    sample: int | None,
+    folder: Path | None,
+    progress: Progress | None = None,
+    **asked: Any,
 ) -> Outcome:
     """Estimate what is in a measurement file, and write it to a folder.
 
@@ -88,13 +113,15 @@ def locate_measurement(
         As in :func:`run_scenario`; None: ``out/SCENARIO-SEED-located``.
     progress
         Called with each stage's steps.
+    asked
+        A region, as :func:`locate` takes it.
     """
     measurement = read(path, sample=sample)
     folder = folder or default_folder(measurement, path, sample)
     output.refuse_to_replace_input(folder, path)
     with output.replacing(folder, own_results.refuse_foreign_results) as new:
         new.mkdir()
-        estimate = locate(measurement, progress=progress)
+        estimate = locate(measurement, progress=progress, **asked)
         result = write_results(new, measurement, estimate, {}, None)
     return Outcome(folder=folder, result=result)
 

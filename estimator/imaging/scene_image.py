@@ -84,7 +84,7 @@ def image_scene(
     chosen = options or ImageOptions()
     if measurement.echo is None:
         raise MeasurementError("there is no 'echo' in the measurement: nothing can be imaged")
-    _refuse_ranges(measurement.echo, chosen)
+    refuse_ranges(chosen)
     view = viewpoint(middles(measurement.echo), measurement.boresight)
     echo = in_frame(measurement.echo, view.frame)
     grid, notes = scene_grid(echo, view, chosen)
@@ -122,7 +122,14 @@ def image_scene(
     )
 
 
-def _refuse_ranges(echo: Echo, options: ImageOptions) -> None:
+def refuse_ranges(options: ImageOptions) -> None:
+    """Refuse a pixel or ranges that leave nothing to image.
+
+    Raises
+    ------
+    MeasurementError
+        If one of them is not finite or negative, or the range ends before it begins.
+    """
     for name, value in (
         ("pixel", options.pixel),
         ("minimum range", options.nearest),

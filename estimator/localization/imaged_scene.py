@@ -86,27 +86,29 @@ class ImagedScene:
         )
 
 
-def imaged_scene(echo: Echo, *, ahead: bool, flat: bool, reason: str) -> ImagedScene:
+def imaged_scene(
+    echo: Echo, *, view: Viewpoint, reason: str, options: ImageOptions | None = None
+) -> ImagedScene:
     """Image what an echo shows, and find targets in it.
 
     Parameters
     ----------
     echo
         In the array's frame.
-    ahead, flat
-        As in :class:`estimator.array.viewpoint.Viewpoint`.
+    view
+        Where the array looks, and its frame.
     reason
         Why no walls are looked for.
+    options
+        What is asked for in the world's frame; ``None``: all is chosen by where the energy is.
     """
-    own = ArrayFrame(origin=np.zeros(3), axes=np.eye(3))
-    view = Viewpoint(frame=own, ahead=ahead, flat=flat)
-    grid, notes = scene_grid(echo, view, ImageOptions())
+    grid, notes = scene_grid(echo, view, options or ImageOptions())
     values, method = scene_values(echo, grid, window=SURVEY_TAPER)
     found = image_targets(echo, grid, values, survey_weights(echo))
     nothing = () if found else ("nothing stands out of the noise in the image",)
     return ImagedScene(
         echo=echo,
-        flat=flat,
+        flat=view.flat,
         grid=grid,
         values=values,
         found=found,

@@ -17,6 +17,7 @@ from estimator.consistency.pilot_curvature import pilot_lateness
 from estimator.consistency.same_samples import refuse_same_samples
 from estimator.consistency.stated_heights import height_error
 from estimator.imaging.energy_region import middles
+from estimator.imaging.scene_image import ImageOptions
 from estimator.localization.clock import clock_note, on_our_clock
 from estimator.localization.close_up import close_up
 from estimator.localization.frames import local_echo, local_uplink, user_in_world
@@ -24,7 +25,14 @@ from estimator.localization.stages import MappedRoom, Stages
 from estimator.localization.stages_2d import LinearStages
 from estimator.localization.stages_3d import PlanarStages
 from estimator.localization.stages_free import FreeStages
-from estimator.measurement.model import Echo, Measurement, Uplink, frequency_step
+from estimator.localization.stages_region import RegionStages
+from estimator.measurement.model import (
+    Echo,
+    Measurement,
+    MeasurementError,
+    Uplink,
+    frequency_step,
+)
 from estimator.positioning.decision_rules import decide
 from estimator.positioning.map_context import MapContext, no_image
 from estimator.results.deferred import Deferred
@@ -40,9 +48,21 @@ from estimator.results.estimate import (
 
 
 def _stages(
+    measurement: Measurement, region: ImageOptions | None
+) -> tuple[Stages[AngleRangeMap] | Stages[DirectionMap], tuple[str, ...]]:
+    """Choose the stages by the array's shape and by what was asked for; say what was assumed."""
+    stages, told = _by_shape(measurement)
+    if region is None:
+        return stages, told
+    if measurement.echo is None:
+        raise MeasurementError("a region was asked for, but no echo was measured: leave it out")
+    view = viewpoint(middles(measurement.echo), measurement.boresight)
+    return RegionStages(stages=stages, view=view, options=region), told
+
+
+def _by_shape(
     measurement: Measurement,
 ) -> tuple[Stages[AngleRangeMap] | Stages[DirectionMap], tuple[str, ...]]:
-    """Choose the stages by the array's shape, and say what was assumed."""
     measured = measurement.echo or measurement.uplinks[0]
     places = middles(measured) if isinstance(measured, Echo) else measured.positions
     if not spans_a_plane(places):
@@ -55,7 +75,11 @@ def _stages(
 
 
 def locate(
-    measurement: Measurement, *, images: bool = True, progress: Progress | None = None
+    measurement: Measurement,
+    *,
+    region: ImageOptions | None = None,
+    images: bool = True,
+    progress: Progress | None = None,
 ) -> Estimate:
     """Find mirrors and users from a measurement alone.
 
@@ -63,6 +87,9 @@ def locate(
     ----------
     measurement
         Echo and uplinks of a linear or a planar array; either may be missing.
+    region
+        Where to look for targets, in the world's frame: it is imaged, and no walls are looked for.
+        ``None``: chosen, and walls are looked for where the array suits.
     images
         Whether images and close-ups can be asked for later; then the answer holds the measurement
         that they are formed of.
@@ -77,11 +104,11 @@ def locate(
     ------
     MeasurementError
         If there is one position only, pilots came to an array that is neither linear nor planar,
-        the frequency grid is not uniform, or the waves are such as an array of its shape cannot
-        take.
+        the frequency grid is not uniform, the waves are such as an array of its shape cannot
+        take, or a region is empty or comes without an echo.
     """
     measured = measurement.echo or measurement.uplinks[0]
-    stages, assumed = _stages(measurement)
+    stages, assumed = _stages(measurement, region)
     tell = progress or (lambda stage, done, total: None)
     timings: dict[str, float] = {}
     notes: list[str] = list(assumed)

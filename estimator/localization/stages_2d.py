@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from estimator.array.array_frame import ArrayFrame, array_frame
 from estimator.array.linear_array import NEAREST, echo_reach, echo_resolution, imaged_sine
+from estimator.array.viewpoint import Viewpoint
 from estimator.channel.angle_range_map_2d import (
     angle_range_map,
     default_angles,
@@ -97,6 +98,10 @@ class LinearRoom:
         return room_images(self.echo, self.map, frame, paths)
 
 
+OWN = Viewpoint(frame=ArrayFrame(origin=np.zeros(3), axes=np.eye(3)), ahead=True, flat=True)
+"""A linear array, seen in its own frame: its image is the plane before it."""
+
+
 @dataclass(frozen=True)
 class LinearStages:
     """The stages of a linear array."""
@@ -118,7 +123,7 @@ class LinearStages:
             echo_reach(echo)  # refuses it: all ranges would seem close
         reason = close_scene(echo, nearest=nearest, planar=False)
         if reason is not None:
-            return imaged_scene(echo, ahead=True, flat=True, reason=reason)
+            return imaged_scene(echo, view=OWN, reason=reason)
         return LinearRoom(echo=echo, map=build_room_map(echo))
 
     def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[AngleRangeMap]:

@@ -119,12 +119,12 @@ class PlanarStages:
     def _mapped(self, echo: Echo) -> MappedRoom:
         if echo.transmit_positions is not None:
             reason = "transmitters stand apart from the receivers of a planar array"
-            return imaged_scene(echo, ahead=True, flat=False, reason=reason)
+            return imaged_scene(echo, view=self.view, reason=reason)
         array = planar_array(echo.positions)
         close = close_scene(echo, nearest=CLOSE * 2 * array.half, planar=True)
         unsuited = close or too_large(echo, array)
         if unsuited is not None:
-            return imaged_scene(echo, ahead=True, flat=False, reason=unsuited)
+            return imaged_scene(echo, view=self.view, reason=unsuited)
         return PlanarRoom(echo=echo, array=array, map=build_space_map(echo, array))
 
     def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[DirectionMap]:

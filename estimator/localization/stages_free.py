@@ -29,8 +29,7 @@ class FreeStages:
         """Image an echo in the array's frame."""
         return imaged_scene(
             echo,
-            ahead=self.view.ahead,
-            flat=self.view.flat,
+            view=self.view,
             reason="the positions are neither on a line nor in a plane that faces the scene",
         )
 

@@ -41,9 +41,9 @@ WIDE = 4.0
 """Extent from which a target may be more than a point, of which the tapered lobe spans 2.7 down to
 :data:`REGION`. [cells]"""
 BROADER = 3.0
-"""Level of a point's own response, over :data:`REGION`, at the ends of a region that a point alone
-explains: with few frequencies it is long in depth, and longer behind the point than before it. It is
-what half a pixel to a cell at either end changes. Chosen, not measured. [-]"""
+"""How far below :data:`REGION` a point's own response may be at the ends of a region that a point
+alone explains: with few frequencies it is long in depth, and longer behind the point than before
+it. It is what a pixel at either end changes. Chosen, not measured. [-]"""
 RESPONSE = 41
 """Points along a region at which a point's own response is computed. [-]"""
 SHADOW = 0.1

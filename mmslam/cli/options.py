@@ -39,6 +39,24 @@ DryRun = Annotated[
     bool,
     typer.Option("--dry-run", help="Only say how many, how long and how large, by one of them."),
 ]
+RegionX = Annotated[
+    tuple[float, float] | None, typer.Option("--x", metavar="FROM TO", help="Region [m].")
+]
+RegionY = Annotated[
+    tuple[float, float] | None, typer.Option("--y", metavar="FROM TO", help="Region [m].")
+]
+RegionZ = Annotated[
+    tuple[float, float] | None, typer.Option("--z", metavar="FROM TO", help="Region [m].")
+]
+Pixel = Annotated[
+    float | None, typer.Option(metavar="METRES", help="Spacing [half the finest resolution].")
+]
+MinRange = Annotated[
+    float | None, typer.Option(metavar="METRES", help="Nearest that is looked at.")
+]
+MaxRange = Annotated[
+    float | None, typer.Option(metavar="METRES", help="Farthest that is looked at.")
+]
 OutFile = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE.zarr", help="Measurement file to write.")
 ]

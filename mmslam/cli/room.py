@@ -6,7 +6,20 @@ from typing import Annotated
 import typer
 
 import mmslam
-from mmslam.cli.options import AsJson, OutFile, OutFolder, Overrides, ScenarioName, Seed
+from mmslam.cli.options import (
+    AsJson,
+    MaxRange,
+    MinRange,
+    OutFile,
+    OutFolder,
+    Overrides,
+    Pixel,
+    RegionX,
+    RegionY,
+    RegionZ,
+    ScenarioName,
+    Seed,
+)
 from mmslam.cli.printing import print_json, print_outcome, print_written
 from mmslam.plain_text import visible
 from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
@@ -145,6 +158,12 @@ def locate(
     sample: Annotated[
         int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
     ] = None,
+    x: RegionX = None,
+    y: RegionY = None,
+    z: RegionZ = None,
+    pixel: Pixel = None,
+    min_range: MinRange = None,
+    max_range: MaxRange = None,
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -152,14 +171,29 @@ def locate(
 
     Writes to `--out` (default `out/SCENARIO-SEED-located/`) what `run` writes, but for the
     measurement. A truth in the file is opened after the estimate only, to compare.
+
+    With a region (`--x`, `--y`, `--z`, `--min-range`, `--max-range`) or a `--pixel`, targets are
+    looked for in an image of it, and no walls.
     """
     with told_clearly():
         from mmslam.terminal.stage_progress import StageProgress
 
         with stdout_kept_clean(), StageProgress() as progress:
             from mmslam.location import locate_measurement
+            from mmslam.region import ANY
 
-            outcome = locate_measurement(measurement, sample=sample, folder=out, progress=progress)
+            outcome = locate_measurement(
+                measurement,
+                sample=sample,
+                folder=out,
+                progress=progress,
+                x=x or ANY,
+                y=y or ANY,
+                z=z or ANY,
+                pixel=pixel,
+                min_range=min_range,
+                max_range=max_range,
+            )
         print_outcome(outcome.result, outcome.folder, as_json)
 
 
@@ -168,24 +202,12 @@ def image(
     sample: Annotated[
         int | None, typer.Option(min=0, help="Which sample, if the file is a dataset.")
     ] = None,
-    x: Annotated[
-        tuple[float, float] | None, typer.Option("--x", metavar="FROM TO", help="Region [m].")
-    ] = None,
-    y: Annotated[
-        tuple[float, float] | None, typer.Option("--y", metavar="FROM TO", help="Region [m].")
-    ] = None,
-    z: Annotated[
-        tuple[float, float] | None, typer.Option("--z", metavar="FROM TO", help="Region [m].")
-    ] = None,
-    pixel: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Spacing [half the finest resolution].")
-    ] = None,
-    min_range: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Nearest that is looked at.")
-    ] = None,
-    max_range: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Farthest that is looked at.")
-    ] = None,
+    x: RegionX = None,
+    y: RegionY = None,
+    z: RegionZ = None,
+    pixel: Pixel = None,
+    min_range: MinRange = None,
+    max_range: MaxRange = None,
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -198,15 +220,15 @@ def image(
     with told_clearly():
         with stdout_kept_clean():
             from mmslam.commands.focus import image_lines, image_to_folder
+            from mmslam.region import ANY
 
-            nothing = (None, None)
             document, folder = image_to_folder(
                 measurement,
                 sample=sample,
                 folder=out,
-                x=x or nothing,
-                y=y or nothing,
-                z=z or nothing,
+                x=x or ANY,
+                y=y or ANY,
+                z=z or ANY,
                 pixel=pixel,
                 min_range=min_range,
                 max_range=max_range,

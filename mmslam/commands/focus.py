@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from estimator.imaging.scene_image import ImageOptions, SceneImage, image_scene
+from estimator.imaging.scene_image import SceneImage, image_scene
 from estimator.measurement.model import Measurement as PlainMeasurement
 from mmslam import output
 from mmslam.measurement import Measurement
 from mmslam.measurement_files import read
 from mmslam.own_results import FORMAT, IMAGE, IMAGE_PARTS, refuse_foreign_image
 from mmslam.plain_text import drawn_plainly, file_name, json_text
+from mmslam.region import ANY, Bounds, asked_region
 from mmslam.results.estimate import Image
 from validation.figures import figures_2d, figures_3d, views
 
@@ -28,15 +29,12 @@ class FocusedImage(Image):
     notes: tuple[str, ...] = ()
 
 
-Bounds = tuple[float | None, float | None]
-
-
 def image(
     measurement: PlainMeasurement,
     *,
-    x: Bounds = (None, None),
-    y: Bounds = (None, None),
-    z: Bounds = (None, None),
+    x: Bounds = ANY,
+    y: Bounds = ANY,
+    z: Bounds = ANY,
     pixel: float | None = None,
     min_range: float | None = None,
     max_range: float | None = None,
@@ -76,15 +74,8 @@ def image(
     ('back-projection', 1)
     """
     seen = measurement.without_truth() if isinstance(measurement, Measurement) else measurement
-    bounds = (x, y, z)
-    options = ImageOptions(
-        low=(bounds[0][0], bounds[1][0], bounds[2][0]),
-        high=(bounds[0][1], bounds[1][1], bounds[2][1]),
-        pixel=pixel,
-        nearest=min_range,
-        farthest=max_range,
-    )
-    made: SceneImage = image_scene(seen, options=None if options == ImageOptions() else options)
+    options = asked_region(x=x, y=y, z=z, pixel=pixel, near=min_range, far=max_range)
+    made: SceneImage = image_scene(seen, options=options)
     return FocusedImage(
         values=made.image.values, grid=made.image.grid, method=made.method, notes=made.notes
     )

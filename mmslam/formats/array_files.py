@@ -40,6 +40,9 @@ SUFFIXES = {
 NAMELESS = ("npy", "csv", "dzt")
 """Formats whose files may hold one array without a name."""
 
+RECORDS = (("r", "i"), ("re", "im"), ("real", "imag"), ("i", "q"))
+"""Names of the two parts of records that are complex numbers."""
+
 _NETCDF_3 = (b"CDF\x01", b"CDF\x02")
 
 
@@ -76,6 +79,7 @@ class ArrayFiles:
                 f"{path}: which of its arrays? name it by variable in the mapping"
             )
         values = self._nameless(path, kind) if name is None else self._named(path, kind, name)
+        values = _complex_of_records(values)
         if values.dtype.kind not in "iufc":
             raise MeasurementError(
                 f"{path}: {name or 'the array'!r} holds {values.dtype}; only numbers are read"
@@ -126,6 +130,17 @@ class ArrayFiles:
             f"{path}: not an HDF5{' or NetCDF' if kind == 'netcdf' else ''} file, whatever its "
             "name says; export it again"
         )
+
+
+def _complex_of_records(values: np.ndarray) -> np.ndarray:
+    """Join pairs of a real and an imaginary part, as integer I and Q are stored."""
+    names = values.dtype.names or ()
+    if tuple(name.lower() for name in names) not in RECORDS:
+        return values
+    real, imaginary = (values[name] for name in names)
+    if real.dtype.kind not in "iuf" or imaginary.dtype.kind not in "iuf":
+        return values
+    return np.asarray(real.astype(np.float64) + 1j * imaginary.astype(np.float64))
 
 
 def format_of(path: Path) -> str:

@@ -13,8 +13,13 @@ from mmslam.formats.tables.sources import FREQUENCY_UNITS, SourceTable
 from mmslam.formats.time_domain.raw_numbers import raw_array
 
 POSITION = "position"
-GRID_AXES = ("x", "y", "z")
+GRID_AXES = ("x", "y", "z", "azimuth")
 """Names of array axes: of a list of positions, and of a scan over a grid."""
+
+FEWEST_PHASES = 100
+"""Phases from which their extent tells the unit. Chosen, not measured. [-]"""
+FILLED = 0.95
+"""Part of a turn that phases fill: of 100 that are spread evenly all but 4 % do. [-]"""
 
 
 def array_frequencies(
@@ -128,6 +133,7 @@ class _Parts:
             size, axes = self._real(magnitude)
             turn, other = self._real(phase)
             _refuse_unequal(self._path, name, size, turn, axes == other)
+            _refuse_other_unit(self._path, name, turn, degrees=table.phase_deg is not None)
             with np.errstate(over="ignore"):  # what overflows is refused as implausible
                 size = 10 ** (size / 20) if table.magnitude_db else size
             return size * np.exp(1j * (np.deg2rad(turn) if table.phase_deg else turn)), axes
@@ -151,8 +157,8 @@ class _Parts:
         axes = self._axes(path, values, source)
         take = table.take | source.take
         _check_axes(path, name, axes, take, self._sweep)
-        if values.ndim != len(axes) and axes == [self._sweep]:
-            values = np.squeeze(values)  # MATLAB has no vectors
+        if values.ndim > len(axes) and np.squeeze(values).ndim == len(axes):
+            values = np.squeeze(values)  # axes of length 1 need no name; MATLAB has no vectors
         if values.ndim != len(axes):
             raise MeasurementError(
                 f"{path}: {name} has shape {values.shape}, but axes = {axes}; name each axis"
@@ -187,8 +193,8 @@ def _check_axes(path: Path, name: str, axes: list[str], take: dict[str, int], sw
     scan = [axis for axis in axes if axis in GRID_AXES]
     if len(set(axes)) < len(axes) or sweep not in axes or (POSITION in axes and scan):
         raise MeasurementError(
-            f'{path}: {name}.axes = {axes}; give "{sweep}", and "position" or some of "x", "y" '
-            'and "z", each once'
+            f'{path}: {name}.axes = {axes}; give "{sweep}", and "position" or some of "x", "y", '
+            '"z" and "azimuth", each once'
         )
     if set(others) != set(take):
         raise MeasurementError(
@@ -228,6 +234,26 @@ def real_array(path: Path, name: str | None, values: np.ndarray) -> Float[np.nda
             f"{path}: {name or 'the array'!r} is complex; real numbers are needed here"
         )
     return values.astype(np.float64)
+
+
+def _refuse_other_unit(
+    path: Path, name: str, phase: Float[np.ndarray, "..."], *, degrees: bool
+) -> None:
+    """Refuse phases that fill one turn of the other unit to its ends, and no more."""
+    turn, other = (2 * np.pi, "phase_rad") if degrees else (360.0, "phase_deg")
+    known = phase[np.isfinite(phase)]
+    if known.size < FEWEST_PHASES:
+        return
+    low, high = float(known.min()), float(known.max())
+    if high - low < FILLED * turn or high - low > 1.001 * turn:
+        return
+    if abs(low) > 1e-3 * turn and abs(low + turn / 2) > (1 - FILLED) * turn:
+        return  # it neither begins at 0 nor at half a turn below
+    given = "phase_deg" if degrees else "phase_rad"
+    raise MeasurementError(
+        f"{path}: {name}: {given} lies between {low:.4g} and {high:.4g}, which is one turn in the "
+        f"other unit: name it by {other}"
+    )
 
 
 def _refuse_unequal(

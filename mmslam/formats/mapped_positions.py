@@ -74,6 +74,8 @@ def array_positions(
             f"{path}: {name}: {len(values)} of them, but the samples have {count}; positions are "
             "missing, or axes is wrong"
         )
+    if table.snake:
+        values = _turned_rows(path, name, values, grid)
     metres = (values - np.array(table.origin)) / LENGTH_UNITS[table.unit]
     return np.ascontiguousarray(metres, dtype=np.float64)
 
@@ -88,6 +90,11 @@ def _equal_steps(
 ) -> Float[np.ndarray, "places 3"]:
     if grid is None or len(grid) == 1:
         return np.asarray(first + np.arange(count)[:, None] * step)
+    if "azimuth" in grid:
+        raise MeasurementError(
+            f"{path}: {name}: first and step are lengths, but the samples have an axis 'azimuth'; "
+            "give azimuth_deg, radius and z"
+        )
     for axis, one in zip(AXES, step, strict=True):
         if (axis in grid) != (one != 0):
             raise MeasurementError(
@@ -133,13 +140,28 @@ def _coordinates(
     sizes = {axis: one.size for axis, one in lines.items()}
     if len(set(sizes.values())) > 1:
         raise MeasurementError(f"{path}: {name}: coordinates of unequal length ({sizes})")
-    values = np.zeros((next(iter(sizes.values()), count), 3))
-    for column, axis in enumerate(AXES):
-        if axis in lines:
-            values[:, column] = lines[axis]
-        elif axis in given:
-            values[:, column] = given[axis].value
-    return values
+    size = next(iter(sizes.values()), count)
+    columns = {axis: np.full(size, one.value) for axis, one in given.items() if axis not in lines}
+    columns |= lines
+    if "azimuth" in columns:
+        angle = np.deg2rad(columns["azimuth"]) * (-1 if table.turntable else 1)
+        columns["x"] = columns["radius"] * np.cos(angle)
+        columns["y"] = columns["radius"] * np.sin(angle)
+    return np.stack([columns.get(axis, np.zeros(size)) for axis in AXES], axis=-1)
+
+
+def _turned_rows(
+    path: Path, name: str, values: Float[np.ndarray, "places 3"], grid: Grid | None
+) -> Float[np.ndarray, "places 3"]:
+    """Turn every second row of a grid, as a scanner moves that measures there and back."""
+    if grid is None or len(grid) != 2:
+        raise MeasurementError(
+            f"{path}: {name}: snake = true needs a grid of two axes; name them in the samples' "
+            'axes, the slower first, as ["z", "x", "frequency"]'
+        )
+    rows = values.reshape(*grid.values(), 3).copy()
+    rows[1::2] = rows[1::2, ::-1]
+    return rows.reshape(-1, 3)
 
 
 def _over_grid(

@@ -146,7 +146,7 @@ def _matched(
     folder: Path, pattern: str, table: PositionTable, suffix: re.Pattern[str]
 ) -> FolderList:
     fields = fields_of_pattern(pattern)
-    names = sorted(entry.name for entry in folder.iterdir() if suffix.search(entry.name))
+    names = _names_in(folder, pattern.count("/"), suffix)
     expression = expression_of_pattern(pattern)
     matches = {name: match for name in names if (match := expression.fullmatch(name))}
     if not matches:
@@ -186,6 +186,16 @@ def _matched(
     )
 
 
+def _names_in(folder: Path, depth: int, suffix: re.Pattern[str]) -> list[str]:
+    """List the files of a kind in a folder, or in its folders so deep; none through a link out."""
+    root = folder.resolve()
+    return sorted(
+        entry.relative_to(folder).as_posix()
+        for entry in folder.glob("/".join(["*"] * (depth + 1)))
+        if suffix.search(entry.name) and (depth == 0 or entry.resolve().is_relative_to(root))
+    )
+
+
 def _count(places: Float[np.ndarray, "positions 3"]) -> bool:
     """Tell whether the numbers along each axis are whole and rise by one."""
     axes = [np.unique(column) for column in places.T]
@@ -221,9 +231,11 @@ def _list_file(folder: Path, base: Path, name: str) -> Path:
 
 def _listed(folder: Path, path: Path, table: PositionTable, suffix: re.Pattern[str]) -> FolderList:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.DictReader(stream, skipinitialspace=True)
-            rows = list(reader)
+        text = path.read_text(encoding="utf-8-sig")
+        lines = [one for one in text.splitlines() if one.strip() and not one.startswith("#")]
+        semicolons = bool(lines) and ";" in lines[0]
+        reader = csv.DictReader(lines, skipinitialspace=True, delimiter=";" if semicolons else ",")
+        rows = list(reader)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise MeasurementError(f"{path}: cannot be read as CSV ({error})") from None
     columns = [name for name in reader.fieldnames or [] if name]
@@ -275,8 +287,8 @@ def _coordinates(
             if name not in columns:
                 continue
             try:
-                values[line, axis] = float(row[name])
-            except (TypeError, ValueError):
+                values[line, axis] = float(row[name].replace(",", "."))
+            except (AttributeError, ValueError):
                 values[line, axis] = np.nan
             if not np.isfinite(values[line, axis]):
                 raise MeasurementError(

@@ -7,7 +7,15 @@ from pydantic import BeforeValidator, Field, model_validator
 from scenes.schema.quantities import Checked
 
 FREQUENCY_UNITS = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "GHz": 1e9, "THz": 1e12}
-LENGTH_UNITS = {"m": 1.0, "cm": 1e2, "mm": 1e3, "um": 1e6}
+LENGTH_UNITS = {
+    "m": 1.0,
+    "cm": 1e2,
+    "mm": 1e3,
+    "um": 1e6,
+    "in": 1 / 0.0254,
+    "mil": 1 / 0.0254e-3,
+    "ft": 1 / 0.3048,
+}
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "fs": 1e15}
 """Factors to hertz; divisors to metres and seconds (0.5/1000 is the double nearest to 0.0005)."""
 
@@ -45,8 +53,9 @@ def _source(value: Any) -> Any:
 
 
 def _coordinate(value: Any) -> Any:
-    if isinstance(value, str):  # an .npy file has no names: "x.npy" can only be the file
-        return {"file" if value.lower().endswith(".npy") else "variable": value}
+    if isinstance(value, str):  # these files have no names: "x.npy" can only be the file
+        alone = value.lower().endswith((".npy", ".txt", ".dat", ".asc"))
+        return {"file" if alone else "variable": value}
     if isinstance(value, int | float) and not isinstance(value, bool):
         return {"value": float(value)}
     return value

@@ -48,7 +48,10 @@ def read_csv_grid(path: Path, *, frequency: str | None, coordinates: tuple[str, 
     """
     table = read_columns(path)
     names, values = table.names, table.values
-    columns = dict(zip(names, values.T, strict=True))
+    columns = {
+        name: column if np.iscomplexobj(column) and column.imag.any() else column.real
+        for name, column in zip(names, values.T, strict=True)
+    }
     keys = [name for name in coordinates if name in columns]
     where = np.zeros(len(values), dtype=np.int64)
     sweep = np.zeros(len(values), dtype=np.int64)

@@ -1,7 +1,9 @@
 """Numbers in a text file, and the names of its columns, as programs and instruments write them.
 
 Supported are RFC 4180 (quoted names with commas in them), semicolons with decimal commas, tabs and
-blanks, names in a remark above the numbers (CST), and files without names.
+blanks, names in a remark above the numbers (CST), a line of units below them, analysers' BEGIN and
+END, complex numbers (``1.5-2i``), files without names, and texts in UTF-8, UTF-16 or Windows' own
+code.
 """
 
 import csv
@@ -10,9 +12,10 @@ import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Num
 
 from estimator.measurement.model import MeasurementError
 
@@ -22,8 +25,14 @@ REMARKS = "#%!"
 LARGEST_TEXT = 2**30
 """Largest text file that is read [byte]."""
 
+PLAIN = 0.5
+"""Part of the signs of a text of numbers that ASCII has at least, whatever code it is in. [-]"""
+
 _DELIMITERS = (",", ";", "\t", None)  # None: any number of blanks
 _RULE = re.compile(r"[-=_\s]*")
+_FRAME = re.compile(r"(BEGIN\b.*|END)\s*", re.IGNORECASE)
+"""Lines around the numbers in the files of network analysers."""
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +40,11 @@ class TextColumns:
     """The columns of a text file; without names of their own they are called 0, 1, 2, …."""
 
     names: list[str]
-    values: Float[np.ndarray, "rows columns"]
+    values: Num[np.ndarray, "rows columns"]  # complex if a column is
 
 
 def read_columns(path: Path) -> TextColumns:
-    """Read a table of real numbers.
+    """Read a table of real or complex numbers.
 
     Raises
     ------
@@ -49,13 +58,11 @@ def read_columns(path: Path) -> TextColumns:
     if not body.strip():
         raise MeasurementError(f"{path}: no row of numbers after the header; it may be truncated")
     try:
-        values = np.loadtxt(
-            io.StringIO(body.replace(",", ".") if decimal_comma else body),
-            delimiter=delimiter, comments=REMARKS[0], quotechar='"', ndmin=2,
-        )  # fmt: skip
+        values = _numbers(body, delimiter, decimal_comma, quote='"')
     except ValueError as error:
+        why = str(error).split("; use `usecols`", maxsplit=1)[0].rstrip(".")
         raise MeasurementError(
-            f"{path}: {error} (rows are counted after the header); give a number in every column"
+            f"{path}: {why} (rows are counted after the header); give a number in every column"
         ) from None
     if values.shape[1] != len(names):
         raise MeasurementError(
@@ -89,17 +96,27 @@ def read_matrix(path: Path) -> np.ndarray:
         raise MeasurementError(f"{path}: no row of numbers; it may be truncated")
     first = body.split("\n", 1)[0]
     delimiter, decimal_comma = _delimiter([], first)
-    stream = io.StringIO(body.replace(",", ".") if decimal_comma else body)
-    complex_numbers = not all(_is_number(field) for field in _fields(first, delimiter))
     try:
-        if complex_numbers:
-            return np.loadtxt(
-                stream, delimiter=delimiter, comments=REMARKS[0], dtype=np.complex128,
-                converters=_complex, ndmin=2,
-            )  # fmt: skip
-        return np.loadtxt(stream, delimiter=delimiter, comments=REMARKS[0], ndmin=2)
+        return _numbers(body, delimiter, decimal_comma)
     except ValueError as error:
         raise MeasurementError(f"{path}: {error}; every line must be a row of numbers") from None
+
+
+def _numbers(
+    body: str, delimiter: str | None, decimal_comma: bool, quote: str | None = None
+) -> Num[np.ndarray, "rows columns"]:
+    """Read rows of numbers; complex ones if the first row holds one."""
+    first = body.split("\n", 1)[0]
+    body = body.replace(",", ".") if decimal_comma else body
+    fields = _fields(first, delimiter)
+    options: dict[str, Any] = {}
+    if not all(_is_number(one.replace(",", ".") if decimal_comma else one) for one in fields):
+        if all(_is_number(one) or _is_complex(one) for one in fields):
+            options = {"dtype": np.complex128, "converters": _complex}
+    return np.loadtxt(
+        io.StringIO(body), delimiter=delimiter, comments=REMARKS[0], quotechar=quote, ndmin=2,
+        **options,
+    )  # fmt: skip
 
 
 def _text(path: Path) -> str:
@@ -110,9 +127,24 @@ def _text(path: Path) -> str:
                 f"{path}: {size} bytes are more than {LARGEST_TEXT}; save it as .npy, or import "
                 "in parts"
             )
-        return path.read_text(encoding="utf-8-sig")
+        written = path.read_bytes()
+        if written.startswith(_UTF_16):
+            return _lines(written.decode("utf-16"))
+        if b"\0" in written[:4096]:
+            raise MeasurementError(f"{path}: cannot be read as text (it holds binary data)")
+        try:
+            return _lines(written.decode("utf-8-sig"))
+        except UnicodeDecodeError:  # every byte is a character of it: signs of names may be wrong
+            text = written.decode("cp1252", errors="replace")
+            if sum(sign.isascii() for sign in text) < PLAIN * len(text):
+                raise
+            return _lines(text)
     except (OSError, UnicodeDecodeError) as error:
         raise MeasurementError(f"{path}: cannot be read as text ({error})") from None
+
+
+def _lines(text: str) -> str:
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _split(text: str) -> tuple[list[str], str]:
@@ -125,11 +157,24 @@ def _split(text: str) -> tuple[list[str], str]:
         if line[0] in REMARKS:
             head.append(line.strip())
             continue
-        rest = "".join(one for one in stream if not one.startswith(tuple(REMARKS)))
+        if _FRAME.fullmatch(line):
+            continue
+        rest = "".join(
+            one
+            for one in stream
+            if not one.startswith(tuple(REMARKS)) and not _FRAME.fullmatch(one)
+        )
         if any(_is_row(line, delimiter) for delimiter in _DELIMITERS):
             return head, line + rest
-        return [*head, line.strip()], rest.lstrip("\r\n")
+        return [*head, line.strip()], _without_units(rest.lstrip("\n"))
     return head, ""
+
+
+def _without_units(body: str) -> str:
+    """Drop a line below the names that holds no digit: the columns' units."""
+    first, _, rest = body.partition("\n")
+    numbered = any(sign.isdigit() for sign in first) or "nan" in first.lower()
+    return body if numbered or not rest.strip() else rest
 
 
 def _delimiter(head: list[str], first: str) -> tuple[str | None, bool]:

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import mmslam
-from estimator.measurement.model import Echo, Measurement, MeasurementError
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from mmslam.cli import app
 from validation.analytic.point_scatterer import point_echo
 
@@ -71,3 +71,35 @@ def test_the_command_writes_the_image_and_replaces_its_own_only(
     refused = CliRunner().invoke(app, arguments)
     assert refused.exit_code == 2
     assert "mine.txt" in refused.output
+
+
+def test_targets_are_looked_for_in_the_region_that_is_asked_for_only(
+    scan: Measurement,
+) -> None:
+    assert scan.echo is not None
+    estimate = mmslam.locate(scan, y=(0.08, 0.16), images=False)
+    assert not estimate.mirrors
+    # a tenth of the cell λ/2D · R of 10 mm; the sweep has no noise
+    assert np.abs(estimate.targets[0].position - PLACE).max() < 1e-3
+    assert any("a region was asked for" in note for note in estimate.notes)
+    behind = mmslam.locate(scan, y=(0.3, 0.35), images=False)
+    assert all(0.3 <= target.position[1] <= 0.35 for target in behind.targets)
+    with pytest.raises(MeasurementError, match=r"maximum range 0.1 m is not beyond the minimum"):
+        mmslam.locate(scan, min_range=0.2, max_range=0.1)
+    pilot = Uplink(
+        samples=scan.echo.samples,
+        positions=scan.echo.positions,
+        frequencies=scan.echo.frequencies,
+        user="ann",
+    )
+    with pytest.raises(MeasurementError, match="no echo was measured: leave it out"):
+        mmslam.locate(Measurement(echo=None, uplinks=(pilot,)), pixel=0.01)
+
+
+def test_the_command_locates_in_a_region(scan: Measurement, tmp_path: Path) -> None:
+    mmslam.write(tmp_path / "scan.zarr", mmslam.Measurement.of(scan))
+    arguments = ["locate", str(tmp_path / "scan.zarr"), "--out", str(tmp_path / "out"), "--json"]
+    done = CliRunner().invoke(app, [*arguments, "--y", "0.08", "0.16", "--x", "-0.05", "0.05"])
+    assert done.exit_code == 0, done.output
+    place = json.loads(done.stdout)["targets"][0]["position_m"]
+    assert np.abs(np.array(place) - PLACE).max() < 1e-3

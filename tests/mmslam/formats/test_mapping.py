@@ -42,7 +42,7 @@ def test_what_is_not_said_is_a_spherical_wave_of_an_analyser_with_unknown_clock(
     [
         ('unit = "GHz"', "", r"frequency\.unit: missing; give the unit of the numbers"),
         ('unit = "mm"', "", r"positions\.unit: missing; give the unit of the numbers"),
-        ('"mm"', '"inch"', r"positions\.unit = 'inch': must be 'm', 'cm', 'mm' or 'um'"),
+        ('"mm"', '"inch"', r"positions\.unit = 'inch': must be 'm', 'cm', 'mm', 'um',"),
         ('"GHz"', '"ghz"', r"frequency\.unit = 'ghz': must be"),
         ("variable = \"s11\"", "variabel = \"s11\"", r"echo\.variabel: unknown key \(did you mean"),
         ("[echo]", "[echos]", r"echos: unknown key \(did you mean 'echo'\?\)"),
