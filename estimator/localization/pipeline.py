@@ -57,12 +57,14 @@ def _stages(
     if measurement.echo is None:
         raise MeasurementError("a region was asked for, but no echo was measured: leave it out")
     view = viewpoint(middles(measurement.echo), measurement.boresight)
-    return RegionStages(stages=stages, view=view, options=region), told
+    if isinstance(stages, LinearStages):
+        return RegionStages[AngleRangeMap](stages=stages, view=view, options=region), told
+    return RegionStages[DirectionMap](stages=stages, view=view, options=region), told
 
 
 def _by_shape(
     measurement: Measurement,
-) -> tuple[Stages[AngleRangeMap] | Stages[DirectionMap], tuple[str, ...]]:
+) -> tuple[LinearStages | PlanarStages | FreeStages, tuple[str, ...]]:
     measured = measurement.echo or measurement.uplinks[0]
     places = middles(measured) if isinstance(measured, Echo) else measured.positions
     if not spans_a_plane(places):
