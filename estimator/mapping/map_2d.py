@@ -15,6 +15,7 @@ from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
+from estimator.walls.sources_aside import without_sources_aside
 from estimator.walls.wall_detection_2d import detect_mirrors, unassigned_peaks
 
 
@@ -47,7 +48,7 @@ def build_room_map(echo: Echo) -> RoomMap:
     -------
     The map, in the same frame.
     """
-    looked = survey(echo)
+    looked = survey(without_sources_aside(echo))
     found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
     resolution = echo_resolution(echo)
     unfolded = unfold_seen_lines(found, resolution)

@@ -38,6 +38,9 @@ UNSTATED = 0.5
 LEAST_DOUBT = 1e-9
 """Least probability of the contrary that odds are divided by: they stay finite. [-]"""
 
+SAME_BOUNCE = 1e-3
+"""Distance within which two paths are reflected at one place: both follow the same wave. [m]"""
+
 SAME = float(chi2.ppf(1 - false_alarm.DISAGREEMENT, df=2))
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
 
@@ -108,15 +111,55 @@ def with_diffuse_search(
     agreeing = [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
     if len(agreeing) == 1:
         better = agreeing[0] if _spread(agreeing[0]) < _spread(diffuse) else diffuse
+        return _among_alike(replace(better, paths=answer.paths), agreeing[0], answer)
+    return _weighed(diffuse, fix, seen, answer)
+
+
+def _among_alike(better: UserEstimate, agreed: UserEstimate, answer: UserEstimate) -> UserEstimate:
+    """Leave what the diffuse field shows no difference to: more mirrors, or behind the wall.
+
+    A wall scatters what arrives at it. That shows the user's image in the mirrors beyond the wall,
+    and a place behind the wall as its own image.
+    """
+    alike = [one for one in (answer, *answer.alternatives) if _scatters_alike(one, agreed)]
+    chances = [one.probability or 0.0 for one in alike]
+    believed = agreed.probability or UNSTATED
+    left = sum(chances) / (sum(chances) + believed)
+    if (1 - left) * TOGETHER >= CERTAIN:
         return replace(
             better,
             status="found",
             reason=None,
             alternatives=(),
-            paths=answer.paths,
-            probability=TOGETHER,
+            probability=(1 - left) * TOGETHER,
         )
-    return _weighed(diffuse, fix, seen, answer)
+    return replace(
+        better,
+        status="ambiguous",
+        reason="the wall scatters as it would with one more mirror beyond it, or with the user "
+        "behind it",
+        probability=(1 - left) * TOGETHER,
+        alternatives=tuple(
+            replace(
+                one,
+                status="ambiguous",
+                alternatives=(),
+                probability=TOGETHER * chance / (sum(chances) + believed),
+            )
+            for one, chance in zip(alike, chances, strict=True)
+        ),
+    )
+
+
+def _scatters_alike(one: UserEstimate, agreed: UserEstimate) -> bool:
+    """Tell whether the first wall of an answer scatters the same from another place."""
+    if one.path is None or agreed.path is None or not agreed.bounces:
+        return False
+    if one.bounces == 0:
+        return one.line_of_sight is False  # straight, through the wall
+    further = one.bounces is not None and one.bounces > agreed.bounces
+    known = agreed.path[: agreed.bounces + 1]
+    return further and bool(np.allclose(one.path[: len(known)], known, atol=SAME_BOUNCE))
 
 
 def _weighed(

@@ -26,6 +26,7 @@ from estimator.positioning.posterior import (
     strong_unexplained,
     unseen_odds,
 )
+from estimator.positioning.through_walls import behind_the_wall, through_odds
 from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
@@ -36,10 +37,7 @@ UNSEEN_SOMEWHERE = (
     "the path is weaker than a direct one, or comes from where little is shown: a wall that the "
     "image does not show may have reflected it"
 )
-UNSEEN_BEYOND = (
-    "beyond the wall the path passes between two points that may be the ends of another wall, too "
-    "smooth to be seen"
-)
+THROUGH_THE_WALL = "the wave may have come through the wall that seems to reflect it"
 
 
 def on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
@@ -87,6 +85,7 @@ def _decided(
     """Decide by the posterior over all explanations, "none of them" included."""
     logs = [log_weight(one, found, room, chances) for one in consistent]
     ways: dict[int, StraightWay] = {}
+    through: dict[int, float] = {}
     odds = []
     for number, one in enumerate(consistent):
         odds.append(0.0)
@@ -94,14 +93,14 @@ def _decided(
             continue
         alone = placed(name, one, found, room, chains)
         (only,) = one.sightings
+        wave = found.paths[only.path].wave
         if only.chain:
-            assert alone.path is not None
-            sight = look_along_legs(alone.path, room, found.how)
-            way = StraightWay(sight=sight, doubt=None if sight == "clear" else UNSEEN_BEYOND)
+            way = look_along_legs(alone, wave, only.chain, room, found.how)
+            through[number] = through_odds(one, found, room)
         else:
-            way = look_along(alone, found.paths[only.path].wave, room, found.how)
+            way = look_along(alone, wave, room, found.how)
         ways[number] = way
-        odds[-1] = unseen_odds(one, found, room, way.sight)
+        odds[-1] = unseen_odds(one, found, room, way.sight) + through.get(number, 0.0)
     weights = np.exp(np.array(logs) - max(logs))
     total = float((weights * (1 + np.array(odds))).sum())
     places = _places(consistent, weights / total, found.how)
@@ -114,12 +113,18 @@ def _decided(
         for index, share in places[1:]
         if share > NEGLIGIBLE
     ]
-    unseen = float(weights[best] * odds[best] / total)
+    passed = float(weights[best] * through.get(best, 0.0) / total)
+    unseen = float(weights[best] * odds[best] / total) - passed
+    if passed > NEGLIGIBLE:
+        behind = behind_the_wall(answer, consistent[best], found)
+        others.append(replace(behind, probability=passed))
     elsewhere = ways[best].otherwise if best in ways else None
     if elsewhere is not None and unseen > NEGLIGIBLE:
         others.append(replace(elsewhere, probability=unseen))
     contradicted = strong_unexplained(consistent[best], found, room)
     elsewhere_too = sum(share for _, share in places[1:])
+    if passed >= max(unseen, elsewhere_too) and not contradicted:
+        return replace(ambiguous(answer, THROUGH_THE_WALL, others), line_of_sight=None)
     if best in ways and unseen >= elsewhere_too and not contradicted:
         doubt = ways[best].doubt or UNSEEN_SOMEWHERE
         return replace(ambiguous(answer, doubt, others), line_of_sight=None)

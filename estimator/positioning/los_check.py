@@ -16,9 +16,10 @@ from estimator.channel.path import Wave
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
+from estimator.geometry.specular_chains import Chain
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.posterior import Sight
-from estimator.positioning.unseen_mirrors import wall_between
+from estimator.positioning.unseen_mirrors import wall_behind, wall_between
 from estimator.results.estimate import UserEstimate
 
 LOOSE_PEAKS = 12
@@ -32,6 +33,14 @@ measured. [m]"""
 LONGEST_UNSEEN = 0.5
 """Distance of two loose points beyond which they are not taken for the ends of one mirror on a leg
 that the array does not look along. Chosen, not measured. [m]"""
+UNSEEN_BEYOND = (
+    "beyond the wall the path passes between two points that may be the ends of another wall, too "
+    "smooth to be seen"
+)
+EDGE_ON_BEYOND = (
+    "beyond the wall the path passes behind a point that may be the near end of another wall, seen "
+    "edge-on"
+)
 LEAST_IMAGE_CONTRAST = 300.0
 """Intensity of the brightest in an image over its background, below which walls may be there that
 it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
@@ -118,32 +127,79 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
     return StraightWay(sight=sight, doubt=None)
 
 
-def look_along_legs(path: Float[np.ndarray, "vertices 3"], room: MapContext, how: Bearing) -> Sight:
-    """Look for mirrors between two unassigned peaks that cross a path beyond its first mirror.
+def look_along_legs(
+    answer: UserEstimate, wave: Wave, chain: Chain, room: MapContext, how: Bearing
+) -> StraightWay:
+    """Look for mirrors that cross a path beyond its first mirror, and that the map does not show.
 
     In the plane only: in space, two unassigned peaks lie near some segment of the path by chance
     too often to indicate a mirror; this rate has not been measured yet.
 
     Parameters
     ----------
-    path
-        Array, bounces, user. [m]
+    answer
+        Where the path ends, over the mirrors that are known.
+    wave
+        That came over it.
+    chain
+        Its mirrors, from the array outward.
     room, how
         As in :func:`look_along`.
     """
     points = room.unassigned_peaks[:LOOSE_PEAKS]
-    if len(how.coordinates) == 3:
-        return "clear"
+    if len(how.coordinates) == 3 or answer.path is None:
+        return StraightWay(sight="clear", doubt=None)
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         wall = wall_between(points[first], points[second], room.resolution, how)
         if wall is None or np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:
             continue
-        for start, end in pairwise(path[1:]):
-            far = float(np.linalg.norm(end - start))
-            hit = wall.hit(start, (end - start) / far)
-            if hit is not None and USER_SIZE < hit[0] < far - USER_SIZE:
-                return "between ends"
-    return "clear"
+        if _crosses(wall, answer.path):
+            return StraightWay(
+                sight="between ends",
+                doubt=UNSEEN_BEYOND,
+                otherwise=_over_one_more(answer, wave, chain, wall, room, how),
+            )
+    for point in points:
+        wall = wall_behind(point, room.resolution)
+        if _crosses(wall, answer.path):
+            return StraightWay(
+                sight="behind a point",
+                doubt=EDGE_ON_BEYOND,
+                otherwise=_over_one_more(answer, wave, chain, wall, room, how),
+            )
+    return StraightWay(sight="clear", doubt=None)
+
+
+def _crosses(wall: FlatWall, path: Float[np.ndarray, "vertices 3"]) -> bool:
+    """Tell whether a wall crosses a path beyond its first mirror, clear of its ends."""
+    for start, end in pairwise(path[1:]):
+        far = float(np.linalg.norm(end - start))
+        hit = wall.hit(start, (end - start) / far)
+        if hit is not None and USER_SIZE < hit[0] < far - USER_SIZE:
+            return True
+    return False
+
+
+def _over_one_more(
+    answer: UserEstimate,
+    wave: Wave,
+    chain: Chain,
+    wall: FlatWall,
+    room: MapContext,
+    how: Bearing,
+) -> UserEstimate:
+    """Return where the user is if one more wall reflects the path."""
+    known = [room.walls[index] for index in dict.fromkeys(chain)]
+    place = project(how, wave.bearing, wave.path_length, [*known, wall], covariance=wave.covariance)
+    return replace(
+        answer,
+        status="ambiguous",
+        position=place.position,
+        covariance=place.covariance,
+        bounces=len(place.walls),
+        path=place.path,
+        line_of_sight=False,
+    )
 
 
 def hides_walls(contrast: float) -> bool:

@@ -44,15 +44,19 @@ UNSEEN = 0.05
 show. In 2500 random rooms, by the image method, 176 of 2079 strongest paths were reflected ones,
 some over walls that are seen. [-]"""
 
-Sight = Literal["clear", "clear aside", "not shown", "between ends", "something on it"]
+Sight = Literal[
+    "clear", "clear aside", "not shown", "between ends", "behind a point", "something on it"
+]
 """What the image shows on a straight way: nothing, within the angles without grating lobes or
-beyond; or it does not show it; two points that may be a mirror's ends; a point on it."""
+beyond; or it does not show it; two points that may be a mirror's ends; a point before it that may
+be the near end of a mirror seen edge-on; a point on it."""
 
 WITH_A_MIRROR: Mapping[Sight, float] = {
     "clear": 1 / 8,
     "clear aside": 1 / 3,
     "not shown": 1.0,
     "between ends": 2.5,
+    "behind a point": 1.0,
     "something on it": 10.0,
 }
 """How much likelier the image shows that where an unseen mirror is than where none is. Two points
@@ -66,9 +70,9 @@ UNEXPLAINED_UNSEEN = 10.0
 """How much likelier an unseen mirror is for one path if another as strong comes over one for sure:
 nothing that the map shows explains it. [-]"""
 
-FURTHER = {"clear": 5e-4, "between ends": 0.05}
-"""The probability of one more mirror on a way beyond the first that is known, where nothing or a
-mirror's two ends are about it. [-]"""
+FURTHER: Mapping[Sight, float] = {"clear": 5e-4, "between ends": 0.05, "behind a point": 0.02}
+"""The probability of one more mirror on a way beyond the first that is known, where nothing, a
+mirror's two ends or its near end alone are about it. [-]"""
 
 UNEXPLAINED = 0.1
 """Prior probability of a path that nothing explains and that is as strong as the answer's. Of one
@@ -219,7 +223,7 @@ def unseen_odds(explanation: Consensus, found: PathSet, room: MapContext, sight:
     more = UNEXPLAINED_UNSEEN if strong_unexplained(explanation, found, room) else 1.0
     excess = level_of(path, found, room)
     if only.chain:
-        odds = FURTHER["between ends" if sight == "between ends" else "clear"]
+        odds = FURTHER.get(sight, FURTHER["clear"])
     elif excess is None and sight in ("clear", "clear aside"):
         odds = CLEAR_UNSEEN
     else:

@@ -22,6 +22,12 @@ come from beside it. [cells]"""
 EDGE_REACH = 1.0
 """How far edges go on beyond the feet, to either side, over the distance between them: a wall up to
 twice as high as wide, or as wide as high. [-]"""
+EDGE_ON_LENGTH = 0.3
+"""Length of a wall that is seen edge-on, of which the near end alone shows: the longest of the
+random rooms. [m]"""
+EDGE_ON_TILT = 0.15
+"""Standard deviation of its direction about the line of sight: a wall turned farther shows the echo
+of its face or of its far end. Chosen, not measured. [rad]"""
 IN_LINE = 1e-6
 """Sine of the angle between two feet, seen from the array, below which nothing is between. [-]"""
 
@@ -75,3 +81,21 @@ def wall_between(
     return PlaneWall(
         corners=middle + corners @ axes, centre=middle, axes=axes, covariance=covariance
     )
+
+
+def wall_behind(point: Float[np.ndarray, " 3"], resolution: Resolution) -> Wall:
+    """Return the upright wall that runs away from the array behind its near end.
+
+    Parameters
+    ----------
+    point
+        Where the image shows the near end. [m]
+    resolution
+        Of the image.
+    """
+    end = point * (1 + EDGE_ON_LENGTH / float(np.linalg.norm(point)))
+    offset = PEAK_DEVIATION * float(resolution.cell(point, unit_normal(point, end)))
+    # The wall turns about its near end, half its length from the middle.
+    turn = np.array([1.0, 0.5 * EDGE_ON_LENGTH]) * EDGE_ON_TILT
+    covariance = np.outer(turn, turn) + np.diag([0.0, offset**2])
+    return Wall(start=point, end=end, covariance=covariance)

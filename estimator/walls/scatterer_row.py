@@ -102,7 +102,7 @@ def thinned(echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, "
     points = np.linspace(start, end, PLACES_OF_SECTOR) - echo.positions.mean(axis=0)
     ranges = np.linalg.norm(points, axis=-1)
     sines = points[:, 0] / ranges
-    near = SAME_RANGE * _sweep(echo).bin_width
+    near = SAME_RANGE * sweep_of(echo).bin_width
     together = np.abs(ranges[:, None] - ranges) < near
     span = float(np.max(np.abs(sines[:, None] - sines) * together))
     wavelength = speed_of_light / float(echo.frequencies[-1])
@@ -133,7 +133,7 @@ def _ways(
     return [points[None] - end[:, None] for end in ends]
 
 
-def _ranges(
+def ranges_to(
     echo: Echo, points: Float[np.ndarray, "points 3"]
 ) -> Float[np.ndarray, "positions points"]:
     """Return half the way out and back. [m]."""
@@ -149,7 +149,8 @@ def _range_slopes(
     return np.asarray(0.5 * (back + out))
 
 
-def _sweep(echo: Echo) -> Sweep:
+def sweep_of(echo: Echo) -> Sweep:
+    """Return an echo's uniform frequencies."""
     step, count = frequency_step(echo.frequencies), len(echo.frequencies)
     centre = float(echo.frequencies[0]) + 0.5 * (count - 1) * step
     return Sweep(centre=centre, step=step, count=count)
@@ -159,8 +160,8 @@ def row_profiles(
     echo: Echo, start: Float[np.ndarray, " 3"], end: Float[np.ndarray, " 3"]
 ) -> RowProfiles:
     """Range profiles around the wall, at the sweep's own independent ranges."""
-    sweep = _sweep(echo)
-    ranges = _ranges(echo, np.linspace(start, end, PLACES_OF_RANGE))
+    sweep = sweep_of(echo)
+    ranges = ranges_to(echo, np.linspace(start, end, PLACES_OF_RANGE))
     low = int(np.floor(ranges.min() / sweep.bin_width)) - RANGE_MARGIN
     high = int(np.ceil(ranges.max() / sweep.bin_width)) + RANGE_MARGIN
     bins = np.arange(low, min(high, low + sweep.count - 1) + 1) * sweep.bin_width
@@ -186,7 +187,7 @@ def row_echoes_by(
     rates: Float[np.ndarray, "positions points"],
 ) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
     """Return each scatterer's range profiles, and how they change at rates of their ranges."""
-    return point_profiles(_sweep(echo), profiles.ranges, _ranges(echo, points), rates)
+    return point_profiles(sweep_of(echo), profiles.ranges, ranges_to(echo, points), rates)
 
 
 def adjoint(

@@ -1,0 +1,145 @@
+r"""Bright sources beyond the angles without grating lobes, and the echo without them.
+
+Elements farther apart than a quarter of the shortest wavelength see a source at sine s again at
+s ± λ/2d. Over the band that lobe is smeared, but the flash of a wall or a post that faces the array
+is so much brighter than the diffuse echo of other walls that its smear passes for targets, for ends
+of walls, and its sidelobes for walls. The source itself is in the image as well, beyond the sector
+that is searched. So its echo is estimated there and taken off the data, the brightest first:
+scatterers on all cells about the source, as wide as the array, since a facing wall is seen by each
+element at another place, are fitted to the range profiles by least squares (one step of CLEAN
+[1]_ with an extended source).
+
+References
+----------
+.. [1] J. A. Högbom, "Aperture synthesis with a non-regular distribution of interferometer
+       baselines", Astronomy and Astrophysics Supplement 15, 1974.
+"""
+
+from dataclasses import replace
+from itertools import accumulate
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.constants import speed_of_light
+from scipy.linalg import cho_solve
+
+from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolution, imaged_sine
+from estimator.array.windows import survey_weights
+from estimator.imaging.backprojection import backproject
+from estimator.imaging.look_aside_2d import lobes_of_brighter
+from estimator.imaging.peak_detection import mean_background, peaks_above
+from estimator.imaging.survey_2d import STEP
+from estimator.measurement.model import Echo
+from estimator.walls.scatterer_row import (
+    adjoint,
+    factorized,
+    ranges_to,
+    row_echoes,
+    row_profiles,
+    sweep_of,
+)
+
+MOST_SOURCES = 12
+"""Sources that are taken off at the most, for time; chosen, not measured. [-]"""
+LEAST_LEVEL = 300.0
+"""Intensity of a source over the image's background from which its grating lobe, smeared over some
+30 cells, stands out of it. [-]"""
+ORIGIN = 0.5
+"""Intensity anywhere that a source may be the grating lobe of, over the source's own: what is less
+than twice as bright may be the lobe of speckle within the sector. [-]"""
+DEPTH_SPACING, SPACING = 0.75, 0.5
+"""Distances of the scatterers along the ray and across it. With 0.75 across, three of 40 dB are
+left of a post's flash, and its lobes still stand out. [cells]"""
+CELLS_DEEP = 2.25
+"""How far they go on before and behind the source. [cells]"""
+CELLS_BESIDE = 4.0
+"""How far they go on to either side, beside half the aperture. [cells]"""
+MOST_SCATTERERS = 600
+"""Scatterers about one source, for time: of larger apertures less is covered. [-]"""
+
+
+def without_sources_aside(echo: Echo) -> Echo:
+    """Take the bright sources beyond the imaged sector off an echo.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+
+    Returns
+    -------
+    The echo; the same if the sector is as wide as any that is imaged.
+    """
+    limit = imaged_sine(echo)
+    if limit >= WIDEST_SINE:
+        return echo
+    points = _beyond(echo, limit)
+    if not points.size:
+        return echo
+    weights = survey_weights(echo)
+    for _ in range(MOST_SOURCES):
+        intensity = np.abs(backproject(echo, points, weights=weights)) ** 2
+        threshold = LEAST_LEVEL * mean_background(intensity)
+        peaks, levels = peaks_above(intensity, points, threshold)
+        real = peaks[~lobes_of_brighter(echo, peaks, levels, least=ORIGIN)]
+        if not len(real):
+            break
+        echo = replace(echo, samples=echo.samples - _source_echo(echo, real[0]))
+    return echo
+
+
+def _beyond(echo: Echo, limit: float) -> Float[np.ndarray, "ranges sines 3"]:
+    """Return the pixels on both sides of the sector."""
+    resolution = echo_resolution(echo)
+    nearest, farthest = echo_reach(echo)
+    ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)[:, None]
+    count = int(np.ceil((WIDEST_SINE - limit) / (STEP * resolution.across_ray)))
+    right = limit + (np.arange(count) + 1) / count * (WIDEST_SINE - limit)
+    sines = np.concatenate([-right[::-1], right])
+    x = ranges * sines
+    return np.stack([x, ranges * np.sqrt(1 - sines**2), np.zeros_like(x)], axis=-1)
+
+
+def _source_echo(
+    echo: Echo, place: Float[np.ndarray, " 3"]
+) -> Complex[np.ndarray, "positions freqs"]:
+    """Fit scatterers about a place to the echo, and return theirs."""
+    resolution = echo_resolution(echo)
+    reach = float(np.linalg.norm(place))
+    ray = place / reach
+    across = np.array([ray[1], -ray[0], 0.0])
+    cell = resolution.across_ray * reach
+    half = 0.5 * float(np.ptp(echo.positions[:, 0])) + CELLS_BESIDE * cell
+    deep = int(np.ceil(CELLS_DEEP / DEPTH_SPACING))
+    rows = 2 * deep + 1
+    wide = min(int(np.ceil(half / (SPACING * cell))), (MOST_SCATTERERS // rows - 1) // 2)
+    along = DEPTH_SPACING * resolution.along_ray * np.arange(-deep, deep + 1)
+    beside = SPACING * cell * np.arange(-wide, wide + 1)
+    patch = (place + along[:, None, None] * ray + beside[:, None] * across).reshape(-1, 3)
+    # What is within the sector is searched there.
+    patch = patch[np.abs(patch[:, 0]) > imaged_sine(echo) * np.linalg.norm(patch, axis=-1)]
+    ends = place + beside[[0, -1], None] * across
+    profiles = row_profiles(echo, ends[0], ends[1])
+    echoes = row_echoes(echo, profiles, patch, ray)[0]
+    strengths = cho_solve(factorized(echoes), adjoint(echoes, profiles.values.ravel()))
+    return _echo_of(echo, patch, strengths)
+
+
+def _echo_of(
+    echo: Echo, points: Float[np.ndarray, "points 3"], strengths: Complex[np.ndarray, " points"]
+) -> Complex[np.ndarray, "positions freqs"]:
+    """Return the echo of scatterers, each of which gives its strength at range 0."""
+    sweep = sweep_of(echo)
+    ranges = ranges_to(echo, points)
+    # A phase over uniform frequencies is that of a coarse grid times that of a fine one, and all of
+    # them are powers.
+    fine = int(np.ceil(np.sqrt(sweep.count)))
+    coarse = -(-sweep.count // fine)
+    scale = -4j * np.pi / speed_of_light
+    step = np.exp(scale * sweep.step * ranges)
+    first = strengths * np.exp(scale * float(echo.frequencies[0]) * ranges)
+    near = np.stack(list(accumulate([step] * (fine - 1), np.multiply, initial=np.ones_like(step))))
+    leap = near[-1] * step
+    far = np.stack(list(accumulate([leap] * (coarse - 1), np.multiply, initial=first)))
+    spectra = np.matmul(far.transpose(1, 0, 2), near.transpose(1, 2, 0))
+    return np.asarray(spectra.reshape(len(ranges), -1)[:, : sweep.count])
