@@ -32,7 +32,7 @@ _FENCES = {
     "{": "{", "}": "}", "lfloor": "⌊", "rfloor": "⌋",
 }  # fmt: skip
 _SUMS = {"sum": "∑", "prod": "∏"}
-_INTEGRALS = {"int": "∫", "iint": "∬"}
+_INTEGRALS = {"int": "∫", "iint": "∬", "oint": "∮"}
 _FUNCTIONS = {
     "cos", "sin", "tan", "arcsin", "arccos", "arctan", "cosh", "sinh", "tanh", "exp", "ln", "log",
     "arg", "det",

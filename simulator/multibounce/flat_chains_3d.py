@@ -26,9 +26,15 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from simulator.antennas.beam_culling import AntennaGroup
 from simulator.geometry.mirrors import Mirrors
-from simulator.geometry.polygon_clipping import Polygons, clipped, empty, within_view
+from simulator.geometry.polygon_clipping import empty
 from simulator.geometry.ray_scene import blocked
 from simulator.materials.slab_insertion import LEAST_LEVEL, passage_level
+from simulator.multibounce.views_over_mirrors import (
+    image_over,
+    nearest_places,
+    reflected_by,
+    seen_over,
+)
 from simulator.scene.radio_scene import RadioScene
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import (
@@ -47,10 +53,6 @@ FAINT = 1e-3
 DOUBT = 3.0
 """By how much a chain may be stronger anywhere than at the array's corners and middle, at three
 frequencies: 10 dB, as between the side lobes of a plate and their mean. [-]"""
-
-PULLED = 0.02
-"""Share of the way to the middle of a face by which the place that rays are sent to is moved off
-its edge, at most: rays start off faces by micrometres, which hide their very edges. [-]"""
 
 CLEARLY = 0.9
 """Fresnel zones of a face over those of another one, at most, for it to be taken: between like
@@ -179,8 +181,8 @@ class _Pairs:
         chosen, fewest = None, np.inf
         for place in reversed(range(len(sequence))):
             face = sequence[place]
-            source = _image(mirrors, sequence[:place], sender)
-            other = _image(mirrors, sequence[:place:-1], receiver)
+            source = image_over(mirrors, sequence[:place], sender)
+            other = image_over(mirrors, sequence[:place:-1], receiver)
             corners = mirrors.corners[face]
             ways = [corners.mean(axis=0) - end[0] for end in (source, other)]
             near = [max(float(np.linalg.norm(way)), 1e-9) for way in ways]
@@ -205,8 +207,8 @@ class _Pairs:
         mirrors, face = self.mirrors, sequence[place]
         out, back = sequence[:place], sequence[:place:-1]
         senders, receivers = self.ends(some)
-        lit = _reflects(mirrors, out, senders) & _reflects(mirrors, back, receivers)
-        source, other = _image(mirrors, out, senders), _image(mirrors, back, receivers)
+        lit = reflected_by(mirrors, out, senders) & reflected_by(mirrors, back, receivers)
+        source, other = image_over(mirrors, out, senders), image_over(mirrors, back, receivers)
         sides = mirrors.heights(source, face), mirrors.heights(other, face)
         lit &= (sides[0] * sides[1] > 0) & (np.minimum(*np.abs(sides)) > ON_PLANE)
         if not mirrors.two_sided[face]:
@@ -216,13 +218,13 @@ class _Pairs:
             return found
         left = np.repeat(mirrors.corners[face][None], lit.size, axis=0)
         for leg, eye in ((out, source[lit]), (back, other[lit])):
-            left = _seen_over(mirrors, leg, eye, left, mirrors.normals[face])
+            left = seen_over(mirrors, leg, eye, left, mirrors.normals[face])
         whole = ~empty(left)
         lit, left = lit[whole], left[whole]
         if not lit.size:
             return found
         image = mirrors.images(source[lit], face)
-        meets = _nearest(image, other[lit], left, mirrors.normals[face])
+        meets = nearest_places(image, other[lit], left, mirrors.normals[face])
         ways = self._ways(sequence, place, (senders[lit], receivers[lit]), meets, sides[0][lit])
         lit, left, image, meets = (values[ways.clear] for values in (lit, left, image, meets))
         if not lit.size:
@@ -307,88 +309,6 @@ class _Ways:
             elif passage_level(slabs, frequencies) < LEAST_LEVEL:
                 continue
             yield np.flatnonzero(kind.ravel() == index), through
-
-
-def _image(
-    mirrors: Mirrors, leg: tuple[int, ...], places: Float[np.ndarray, "n 3"]
-) -> Float[np.ndarray, "n 3"]:
-    for mirror in leg:
-        places = mirrors.images(places, mirror)
-    return places
-
-
-def _reflects(
-    mirrors: Mirrors, leg: tuple[int, ...], places: Float[np.ndarray, "n 3"]
-) -> Bool[np.ndarray, " n"]:
-    """Tell which antennas each mirror of a leg reflects."""
-    reflects = np.ones(len(places), dtype=bool)
-    for mirror in leg:
-        heights = mirrors.heights(places, mirror)
-        reflects &= (np.abs(heights) if mirrors.two_sided[mirror] else heights) > ON_PLANE
-        places = mirrors.images(places, mirror)
-    return reflects
-
-
-def _seen_over(
-    mirrors: Mirrors,
-    leg: tuple[int, ...],
-    eyes: Float[np.ndarray, "links 3"],
-    polygons: Polygons,
-    normal: Float[np.ndarray, " 3"],
-) -> Polygons:
-    """Keep what antennas' images see of polygons through all mirrors of a leg."""
-    left = polygons
-    planes = []
-    for place, mirror in enumerate(leg):
-        corners = mirrors.corners[mirror]
-        for later in leg[place + 1 :]:  # unfolded: all in the space of the last
-            corners = mirrors.images(corners, later)
-        planes.append(corners)
-    for place, corners in enumerate(planes):
-        window = np.repeat(corners[None], len(eyes), axis=0)
-        if place:
-            window = _beyond(window, planes[place - 1], eyes)
-        left = within_view(left, eyes, window, normal)
-    return _beyond(left, planes[-1], eyes) if planes else left
-
-
-def _beyond(
-    polygons: Polygons, corners: Float[np.ndarray, "4 3"], eyes: Float[np.ndarray, "links 3"]
-) -> Polygons:
-    """Keep the part of polygons on the other side of a plane than the eyes."""
-    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-    normal /= np.linalg.norm(normal)
-    side = -np.sign((eyes - corners[0]) @ normal)
-    return clipped(polygons, side[:, None] * ((polygons - corners[0]) @ normal))
-
-
-def _nearest(
-    sources: Float[np.ndarray, "links 3"],
-    receivers: Float[np.ndarray, "links 3"],
-    polygons: Polygons,
-    normal: Float[np.ndarray, " 3"],
-) -> Float[np.ndarray, "links 3"]:
-    """Find the places of polygons next to straight lines through their plane, off the edges."""
-    base = polygons[:, 0]
-    below = np.einsum("lx,x->l", sources - base, normal)
-    above = np.einsum("lx,x->l", receivers - base, normal)
-    share = below / (below - above)
-    meets = sources + share[:, None] * (receivers - sources)
-    along = np.roll(polygons, -1, axis=1) - polygons
-    squared = np.einsum("lcx,lcx->lc", along, along)
-    towards = meets[:, None] - polygons
-    beside = np.einsum("lcx,lcx->lc", towards, along) / np.maximum(squared, 1e-30)
-    on_edge = polygons + np.clip(beside, 0.0, 1.0)[..., None] * along
-    apart = np.einsum("lcx,lcx->lc", on_edge - meets[:, None], on_edge - meets[:, None])
-    nearest = np.take_along_axis(on_edge, apart.argmin(axis=1)[:, None, None], axis=1)[:, 0]
-    turns = np.einsum("lcx,x->lc", np.cross(along, towards), normal)
-    inside = (turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)
-    place = np.where(inside[:, None], meets, nearest)
-    inward = polygons.mean(axis=1) - place
-    far = np.sqrt(np.einsum("lx,lx->l", inward, inward))
-    margin = np.where(inside, np.sqrt(apart.min(axis=1)), 0.0)
-    wanted = np.maximum(1.0 - margin / np.maximum(PULLED * far, 1e-12), 0.0)
-    return np.asarray(place + PULLED * wanted[:, None] * inward)
 
 
 def _bent_chain(

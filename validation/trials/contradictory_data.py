@@ -1,4 +1,4 @@
-"""Measurements that contradict themselves; :mod:`validation.experiments.contradictions` tries them.
+"""Measurements that contradict themselves; :mod:`validation.trials.contradictions` tries them.
 
 Each contradiction is a fault of an instrument, of a mapping or of a recording, applied to a clean
 measurement: a function of the measurement, of a size and of a random generator. The room stays as

@@ -1,6 +1,6 @@
 """Data that contradict themselves, and what each gives.
 
-Run as ``python -m validation.experiments.contradictions [SEEDS [NAME …]]``.
+Run as ``python -m validation.trials.contradictions [SEEDS [NAME …]]``.
 
 Not in the thesis. A delay, a scale, a sign, gains, dead or hot positions, a pilot that nobody
 sends: each fault of :mod:`validation.trials.contradictory_data` is put into clean measurements of
