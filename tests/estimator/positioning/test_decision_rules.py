@@ -285,7 +285,9 @@ def test_at_a_walls_very_end_the_ray_may_pass_beside_it(
     assert found.status == "ambiguous"
     assert found.bounces == bounces
     assert found.reason == "the path meets a wall at its very end: it may pass beside it"
-    (other,) = found.alternatives
+    other, *behind = found.alternatives
+    # Whatever seems reflected may have come through the wall; without levels that is improbable.
+    assert all(one.probability is not None and one.probability < 1e-3 for one in behind)
     assert other.bounces == 1 - bounces
     assert found.position is not None
     at(other, image_of(found.position), 1e-6)
