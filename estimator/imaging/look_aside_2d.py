@@ -18,9 +18,8 @@ from estimator.measurement.model import Echo
 HALF_WIDTH = 0.4
 """Sine to either side of the direction that is looked at: a wall 30 cm long whose middle is
 on the ray 0.4 m away ends within it. [-]"""
-BAND = 33
-"""Frequencies over the band at which a grating lobe's origin is looked for: over 30 % of bandwidth
-the origins are then a cell of 130 half wavelengths apart, so that none is between them. [-]"""
+BAND = 9
+"""Frequencies over the band at which a grating lobe's origin is looked for. [-]"""
 LOBE = 4.0
 """Intensity at the origin of a grating lobe over that of the lobe, at least: over the band the lobe
 is smeared, over some 30 cells for 30 % of bandwidth. [-]"""
@@ -62,28 +61,14 @@ def peaks_aside(
     intensity = np.abs(backproject(echo, points, weights=taper)) ** 2
     threshold = peak_threshold(looked.background, float(np.max(np.abs(looked.values) ** 2)))
     peaks, levels = peaks_above(intensity, points, threshold)
-    real: np.ndarray = peaks[~lobes_of_brighter(echo, peaks, levels)]
+    real: np.ndarray = peaks[~_brighter_elsewhere(echo, peaks, levels)]
     return real
 
 
-def lobes_of_brighter(
-    echo: Echo,
-    peaks: Float[np.ndarray, "peaks 3"],
-    levels: Float[np.ndarray, " peaks"],
-    *,
-    least: float = LOBE,
+def _brighter_elsewhere(
+    echo: Echo, peaks: Float[np.ndarray, "peaks 3"], levels: Float[np.ndarray, " peaks"]
 ) -> Bool[np.ndarray, " peaks"]:
-    """Tell which peaks are grating lobes, at sine ± λ/2d, of something brighter.
-
-    Parameters
-    ----------
-    echo
-        In the array's frame.
-    peaks, levels
-        Places in its tapered image, and the intensities there. [m], [-]
-    least
-        Intensity at the origin over that of a peak, from which the peak passes for a lobe. [-]
-    """
+    """Tell which peaks are grating lobes, at sine ± λ/2d, of something brighter."""
     far = np.linalg.norm(peaks, axis=-1)
     if not far.size:
         return np.zeros(0, dtype=bool)
@@ -97,7 +82,7 @@ def lobes_of_brighter(
         ranges = np.broadcast_to(far[:, None], sines.shape)[real]
         origins = _polar(ranges, sines[real])
         there[real] = np.abs(backproject(echo, origins, weights=survey_weights(echo))) ** 2
-    lobes: np.ndarray = there.max(axis=1) > least * levels
+    lobes: np.ndarray = there.max(axis=1) > LOBE * levels
     return lobes
 
 

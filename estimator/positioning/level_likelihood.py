@@ -42,7 +42,7 @@ the materials of the random rooms are metal, of which rough ones lose more than 
 THROUGH_DB_PER_GHZ = 8 / 250
 """Least loss in a wall that a wave crosses, over the frequency: 4 mm of glass take 8 dB at 250 GHz,
 half an inch of plasterboard 24 dB (ITU-R P.2040-4). [dB/GHz]"""
-AIMED_THROUGH = 0.01
+AIMED_THROUGH = 1e-3
 """Probability that a user behind a wall has an antenna with gain that is aimed at the array through
 the wall. Chosen, not measured. [-]"""
 TOLD_TO_DB = 1.0

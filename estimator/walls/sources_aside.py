@@ -4,7 +4,8 @@ Elements farther apart than a quarter of the shortest wavelength see a source at
 s ± λ/2d. Over the band that lobe is smeared, but the flash of a wall or a post that faces the array
 is so much brighter than the diffuse echo of other walls that its smear passes for targets, for ends
 of walls, and its sidelobes for walls. The source itself is in the image as well, beyond the sector
-that is searched. So its echo is estimated there and taken off the data, the brightest first:
+that is searched. So its echo is estimated there and taken off the data, the brightest first,
+as long as it is brighter than all that the sector shows at its range:
 scatterers on all cells about the source, as wide as the array, since a facing wall is seen by each
 element at another place, are fitted to the range profiles by least squares (one step of CLEAN
 [1]_ with an extended source).
@@ -22,12 +23,12 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 from scipy.linalg import cho_solve
+from scipy.ndimage import maximum_filter, maximum_filter1d
 
 from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolution, imaged_sine
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.look_aside_2d import lobes_of_brighter
-from estimator.imaging.peak_detection import mean_background, peaks_above
+from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.survey_2d import STEP
 from estimator.measurement.model import Echo
 from estimator.walls.scatterer_row import (
@@ -39,14 +40,16 @@ from estimator.walls.scatterer_row import (
     sweep_of,
 )
 
-MOST_SOURCES = 12
+MOST_SOURCES = 8
 """Sources that are taken off at the most, for time; chosen, not measured. [-]"""
 LEAST_LEVEL = 300.0
 """Intensity of a source over the image's background from which its grating lobe, smeared over some
 30 cells, stands out of it. [-]"""
-ORIGIN = 0.5
-"""Intensity anywhere that a source may be the grating lobe of, over the source's own: what is less
-than twice as bright may be the lobe of speckle within the sector. [-]"""
+NEAR_LOBE = 0.5
+"""Distance in range within which the lobe of a source appears, over the aperture: the delays of the
+elements are those of the source's sine, which differs from the lobe's by about 1. [-]"""
+MOST_OF_IT = 0.5
+"""Share of the energy from which a source is fitted once more after the others. [-]"""
 DEPTH_SPACING, SPACING = 0.75, 0.5
 """Distances of the scatterers along the ray and across it. With 0.75 across, three of 40 dB are
 left of a post's flash, and its lobes still stand out. [cells]"""
@@ -73,31 +76,45 @@ def without_sources_aside(echo: Echo) -> Echo:
     limit = imaged_sine(echo)
     if limit >= WIDEST_SINE:
         return echo
-    points = _beyond(echo, limit)
-    if not points.size:
-        return echo
+    points, sines = _all_around(echo)
+    within = np.abs(sines) <= limit
+    near = NEAR_LOBE * float(np.ptp(echo.positions[:, 0]))
+    rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
     weights = survey_weights(echo)
+    dominant = []
     for _ in range(MOST_SOURCES):
         intensity = np.abs(backproject(echo, points, weights=weights)) ** 2
-        threshold = LEAST_LEVEL * mean_background(intensity)
-        peaks, levels = peaks_above(intensity, points, threshold)
-        real = peaks[~lobes_of_brighter(echo, peaks, levels, least=ORIGIN)]
-        if not len(real):
+        # The lobe of what is within the sector is weaker than that.
+        shadow = maximum_filter1d(intensity[:, within].max(axis=1), 2 * rows + 1)
+        tops = (intensity == maximum_filter(intensity, size=3)) & (intensity > shadow[:, None])
+        tops[:, within] = False
+        brightest = np.argmax(np.where(tops, intensity, 0.0))
+        if not intensity.flat[brightest] > LEAST_LEVEL * mean_background(intensity):
             break
-        echo = replace(echo, samples=echo.samples - _source_echo(echo, real[0]))
+        if not tops.flat[brightest]:
+            break
+        place = points.reshape(-1, 3)[brightest]
+        left = echo.samples - _source_echo(echo, place)
+        if np.linalg.norm(left) ** 2 < (1 - MOST_OF_IT) * np.linalg.norm(echo.samples) ** 2:
+            dominant.append(place)
+        echo = replace(echo, samples=left)
+    # What was fitted while others were there is left in part.
+    for place in dominant:
+        echo = replace(echo, samples=echo.samples - _source_echo(echo, place))
     return echo
 
 
-def _beyond(echo: Echo, limit: float) -> Float[np.ndarray, "ranges sines 3"]:
-    """Return the pixels on both sides of the sector."""
+def _all_around(
+    echo: Echo,
+) -> tuple[Float[np.ndarray, "ranges sines 3"], Float[np.ndarray, " sines"]]:
+    """Return the pixels in all directions that are imaged at all, and their sines."""
     resolution = echo_resolution(echo)
     nearest, farthest = echo_reach(echo)
     ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)[:, None]
-    count = int(np.ceil((WIDEST_SINE - limit) / (STEP * resolution.across_ray)))
-    right = limit + (np.arange(count) + 1) / count * (WIDEST_SINE - limit)
-    sines = np.concatenate([-right[::-1], right])
+    count = 2 * int(np.ceil(WIDEST_SINE / (STEP * resolution.across_ray))) + 1
+    sines = np.linspace(-WIDEST_SINE, WIDEST_SINE, count)
     x = ranges * sines
-    return np.stack([x, ranges * np.sqrt(1 - sines**2), np.zeros_like(x)], axis=-1)
+    return np.stack([x, ranges * np.sqrt(1 - sines**2), np.zeros_like(x)], axis=-1), sines
 
 
 def _source_echo(
