@@ -95,7 +95,7 @@ def wall_behind(point: Float[np.ndarray, " 3"], resolution: Resolution) -> Wall:
     """
     end = point * (1 + EDGE_ON_LENGTH / float(np.linalg.norm(point)))
     offset = PEAK_DEVIATION * float(resolution.cell(point, unit_normal(point, end)))
-    # The wall turns about its near end, half its length from the middle.
-    turn = np.array([1.0, 0.5 * EDGE_ON_LENGTH]) * EDGE_ON_TILT
+    # It turns about its near end; its middle moves against the normal then, as in wall_between.
+    turn = np.array([1.0, -0.5 * EDGE_ON_LENGTH]) * EDGE_ON_TILT
     covariance = np.outer(turn, turn) + np.diag([0.0, offset**2])
     return Wall(start=point, end=end, covariance=covariance)

@@ -29,5 +29,5 @@ def test_a_wall_behind_a_point_starts_there_and_runs_on_along_the_line_of_sight(
     assert np.sqrt(wall.covariance[0, 0]) == pytest.approx(EDGE_ON_TILT)
     # Turned about its near end, that end stays: its offset varies by the image's cell alone.
     half = 0.5 * float(np.linalg.norm(wall.end - wall.start))
-    at_start = np.array([-half, 1.0])
+    at_start = np.array([half, 1.0])
     assert np.sqrt(at_start @ wall.covariance @ at_start) < 5e-3
