@@ -74,6 +74,8 @@ class Path:
     free: Wave  # fitted with a curvature of its own
     share: float  # of the pilot's energy, less the noise [-]
     unambiguous: float  # longest path that the frequency step tells apart [m]
+    tilt_db: float | None = None
+    """Change of its level over the band, over that of free space; None if unknown. [dB]"""
 
     @property
     def specular(self) -> bool:
@@ -107,6 +109,7 @@ class PathSet:
     """Of (bearing, path length, curvature) of each wave with a curvature of its own."""
     how: Bearing = LINEAR  # what the array measures of a direction
     frequency: float | None = None  # centre of the band, if levels are to count [Hz]
+    bandwidth: float | None = None  # of which the paths' tilts are [Hz]
     power: float | None = None  # of the pilot, less the noise: mean square of S-parameters [-]
 
     @property

@@ -9,6 +9,7 @@ from scipy.constants import speed_of_light
 
 from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import angle_range_map
+from estimator.channel.level_tilt import with_level_tilts
 from estimator.channel.path import (
     LEAST_SHARE,
     MOST_PATHS,
@@ -113,7 +114,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             paths, covariance = _bound(uplink, paths, free)
         except NoWaveError:
             pass  # the summit with the delay's curvature lies elsewhere: keep the free one
-    return PathSet(
+    found_paths = PathSet(
         paths=paths,
         covariance=covariance,
         free_covariance=by_radius * np.outer(slopes, slopes),
@@ -121,6 +122,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
         frequency=float(uplink.frequencies.mean()),
         power=energy / uplink.samples.size,
     )
+    return with_level_tilts(uplink, found_paths)
 
 
 def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:

@@ -14,6 +14,7 @@ from scipy.linalg import block_diag
 from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray
 from estimator.channel.angle_range_map_3d import direction_map
+from estimator.channel.level_tilt import with_level_tilts
 from estimator.channel.path import LEAST_SHARE, MOST_PATHS, Path, PathSet
 from estimator.geometry.bearing_3d import PLANAR
 from estimator.imaging.range_gating import gated
@@ -100,7 +101,7 @@ def find_space_paths(
         this_map = direction_map(residual, array, least_share=LEAST_SHARE, within=first_map)
     paths.sort(key=lambda path: -path.share)
     nothing = np.zeros((0, 0))
-    return PathSet(
+    found_paths = PathSet(
         paths=tuple(paths),
         covariance=block_diag(nothing, *(path.wave.covariance for path in paths)),
         free_covariance=block_diag(nothing, *(path.free.covariance for path in paths)),
@@ -108,6 +109,7 @@ def find_space_paths(
         frequency=float(uplink.frequencies.mean()),
         power=energy / uplink.samples.size,
     )
+    return with_level_tilts(uplink, found_paths)
 
 
 def _bound(near: Uplink, path: Path) -> Path:

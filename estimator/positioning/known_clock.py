@@ -124,7 +124,8 @@ def _decided(
     contradicted = strong_unexplained(consistent[best], found, room)
     elsewhere_too = sum(share for _, share in places[1:])
     if passed >= max(unseen, elsewhere_too) and not contradicted:
-        return replace(ambiguous(answer, THROUGH_THE_WALL, others), line_of_sight=None)
+        open_answer = ambiguous(answer, THROUGH_THE_WALL, others)
+        return replace(_likeliest_first(open_answer), line_of_sight=None)
     if best in ways and unseen >= elsewhere_too and not contradicted:
         doubt = ways[best].doubt or UNSEEN_SOMEWHERE
         return replace(ambiguous(answer, doubt, others), line_of_sight=None)
@@ -140,6 +141,16 @@ def _decided(
     elif same and not contradicted:
         reason = "the path meets a wall at its very end: it may pass beside it"
     return ambiguous(answer, reason, others)
+
+
+def _likeliest_first(answer: UserEstimate) -> UserEstimate:
+    """Exchange an open answer for its likeliest alternative, if that is likelier."""
+    best = max(answer.alternatives, key=lambda one: one.probability or 0.0)
+    if (best.probability or 0.0) <= (answer.probability or 0.0):
+        return answer
+    others = [answer, *(one for one in answer.alternatives if one is not best)]
+    alternatives = tuple(replace(one, alternatives=(), reason=None) for one in others)
+    return replace(best, reason=answer.reason, alternatives=alternatives)
 
 
 def _places(

@@ -3,7 +3,8 @@
 Boards, panes and thin partitions let a part of the wave through, a conductor nothing; the echo does
 not tell which a wall is. A reflected wave is about as strong as free space less the reflection
 loss; a wave through a wall has lost what the wall absorbs, more at higher frequencies. Within the
-wall it is slower than in air, so that the user is nearer than the delay says.
+wall it is slower than in air, so that the user is nearer than the delay says. And what absorbs
+takes more from the band's upper end than from its lower one, which a reflection does not.
 """
 
 from dataclasses import replace
@@ -12,7 +13,11 @@ import numpy as np
 
 from estimator.channel.path import PathSet
 from estimator.geometry.path_tracing import project
-from estimator.positioning.level_likelihood import level_density, through_density
+from estimator.positioning.level_likelihood import (
+    level_density,
+    through_by_tilt,
+    through_density,
+)
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.posterior import arrives_first, level_of
 from estimator.positioning.weighted_least_squares import Consensus
@@ -47,10 +52,13 @@ def through_odds(explanation: Consensus, found: PathSet, room: MapContext) -> fl
     (only,) = explanation.sightings
     path = found.paths[only.path]
     excess = level_of(path, found, room)
+    by_tilt = 1.0
+    if path.tilt_db is not None and found.bandwidth is not None and found.frequency is not None:
+        by_tilt = through_by_tilt(path.tilt_db, found.frequency, found.bandwidth)
     if excess is None or found.frequency is None:
-        return LEVEL_UNKNOWN
+        return LEVEL_UNKNOWN * by_tilt
     reflected = level_density(excess, len(only.chain), first=arrives_first(path, found, room))
-    return THROUGH * through_density(excess, found.frequency) / reflected
+    return THROUGH * through_density(excess, found.frequency) / reflected * by_tilt
 
 
 def behind_the_wall(alone: UserEstimate, explanation: Consensus, found: PathSet) -> UserEstimate:
