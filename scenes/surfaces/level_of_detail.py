@@ -15,6 +15,10 @@ LEAST_FACE = 10.0
 """Mean width of a mesh's flat faces, over the wavelength, above which they count as flat walls and
 not as the approximation of something round: the first Fresnel zone of a link is that wide at a
 hundred wavelengths, a metre at 30 GHz. Chosen. [-]"""
+MOST_FACES = 1000
+"""Flat faces of one mesh above which it stands for something round, whatever their size: each would
+be a mirror of its own, and every pair of them a chain. A room of 3000 triangles has some tens.
+Chosen. [-]"""
 
 
 def flat_and_smooth(body: Body, wavelength: float) -> bool:
@@ -36,6 +40,7 @@ def flat_and_smooth(body: Body, wavelength: float) -> bool:
         case MeshFile(facets="cut"):
             mesh = placed_mesh(body)
             faces = int(flat_patches(mesh).max()) + 1
-            return bool(np.sqrt(mesh.area / faces) >= LEAST_FACE * wavelength)
+            wide = np.sqrt(mesh.area / faces) >= LEAST_FACE * wavelength
+            return bool(wide and faces <= MOST_FACES)
         case _:
             return False
