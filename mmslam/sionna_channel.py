@@ -28,7 +28,16 @@ Source = model.Measurement | Scenario
 
 
 class SionnaChannel(NamedTuple):
-    """A channel in the axis order of Sionna PHY; ``a`` and ``tau`` first, as it takes them."""
+    """A channel in the axis order of Sionna PHY; ``a`` and ``tau`` first, as it takes them.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> small = {"radio.points": 5, "base_station.elements": 4}
+    >>> channel = mmslam.to_sionna_cir(mmslam.load_scenario("slam_2d", small))
+    >>> channel.a.shape, channel.tau.shape
+    ((1, 1, 4, 1, 1, 5, 1), (1, 1, 4, 1, 1, 5))
+    """
 
     a: (
         Complex64[np.ndarray, "batch 1 elements users 1 taps 1"]

@@ -1,4 +1,4 @@
-"""All claims, by subject."""
+"""All claims about the software that are checked, by subject."""
 
 from validation.claims import (
     closed_forms,
