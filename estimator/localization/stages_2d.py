@@ -61,7 +61,7 @@ class LinearRoom:
             unassigned_peaks=self.map.unassigned_peaks,
             reach=echo_reach(self.echo)[1],
             widest=imaged_sine(self.echo),
-            contrast=self.map.survey.contrast,
+            contrast=self.map.contrast,
             late=combined([line.late for line in self.map.lines if line.late is not None]),
             aside=self._aside,
         )

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from estimator.array.array_frame import ArrayFrame
 from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import Wall
+from estimator.imaging.peak_detection import image_contrast
 from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.target_detection import find_targets
 from estimator.mapping.wall_unfolding import unfold_seen_lines
@@ -34,6 +35,8 @@ class RoomMap:
         np.ndarray, "peaks 3"
     ]  # peaks on no wall and behind none, strongest first [m]
     survey: Survey
+    contrast: float
+    """Intensity of the brightest over the background, sources beyond the sector included. [-]"""
 
 
 def build_room_map(echo: Echo) -> RoomMap:
@@ -48,7 +51,8 @@ def build_room_map(echo: Echo) -> RoomMap:
     -------
     The map, in the same frame.
     """
-    looked = survey(without_sources_aside(echo))
+    cleaned, brightest_aside = without_sources_aside(echo)
+    looked = survey(cleaned)
     found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
     resolution = echo_resolution(echo)
     unfolded = unfold_seen_lines(found, resolution)
@@ -61,6 +65,7 @@ def build_room_map(echo: Echo) -> RoomMap:
         targets=find_targets(looked, unfolded, found, resolution, aperture),
         unassigned_peaks=unassigned_peaks(echo, looked, found),
         survey=looked,
+        contrast=max(looked.contrast, image_contrast(brightest_aside, looked.background)),
     )
 
 

@@ -17,6 +17,7 @@ from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.geometry.specular_chains import Chain
+from estimator.geometry.wall_2d import Wall
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.posterior import Sight
 from estimator.positioning.unseen_mirrors import wall_behind, wall_between
@@ -33,6 +34,9 @@ measured. [m]"""
 LONGEST_UNSEEN = 0.5
 """Distance of two loose points beyond which they are not taken for the ends of one mirror on a leg
 that the array does not look along. Chosen, not measured. [m]"""
+CLOUD = 6.0
+"""Distance from a known wall up to which a loose point passes for a part of the wall's echo:
+sidelobes and what was scattered twice. Chosen, not measured. [cells c/2B]"""
 UNSEEN_BEYOND = (
     "beyond the wall the path passes between two points that may be the ends of another wall, too "
     "smooth to be seen"
@@ -160,6 +164,8 @@ def look_along_legs(
                 otherwise=_over_one_more(answer, wave, chain, wall, room, how),
             )
     for point in points:
+        if _beside_a_wall(point, room):
+            continue
         wall = wall_behind(point, room.resolution)
         if _crosses(wall, answer.path):
             return StraightWay(
@@ -168,6 +174,18 @@ def look_along_legs(
                 otherwise=_over_one_more(answer, wave, chain, wall, room, how),
             )
     return StraightWay(sight="clear", doubt=None)
+
+
+def _beside_a_wall(point: Float[np.ndarray, " 3"], room: MapContext) -> bool:
+    """Tell whether a point is so near to a known wall that it may be a sidelobe of the wall's."""
+    for wall in room.walls:
+        assert isinstance(wall, Wall)
+        along = wall.end - wall.start
+        share = np.clip((point - wall.start) @ along / (along @ along), 0.0, 1.0)
+        apart = float(np.linalg.norm(point - wall.start - share * along))
+        if apart < CLOUD * room.resolution.along_ray:
+            return True
+    return False
 
 
 def _crosses(wall: FlatWall, path: Float[np.ndarray, "vertices 3"]) -> bool:

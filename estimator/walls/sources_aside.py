@@ -61,7 +61,7 @@ MOST_SCATTERERS = 600
 """Scatterers about one source, for time: of larger apertures less is covered. [-]"""
 
 
-def without_sources_aside(echo: Echo) -> Echo:
+def without_sources_aside(echo: Echo) -> tuple[Echo, float]:
     """Take the bright sources beyond the imaged sector off an echo.
 
     Parameters
@@ -71,17 +71,19 @@ def without_sources_aside(echo: Echo) -> Echo:
 
     Returns
     -------
-    The echo; the same if the sector is as wide as any that is imaged.
+    The echo, the same if the sector is as wide as any that is imaged; and the intensity of the
+    brightest source in the tapered image, 0 of none: an echo of bright sources is not noisy.
     """
     limit = imaged_sine(echo)
     if limit >= WIDEST_SINE:
-        return echo
+        return echo, 0.0
     points, sines = _all_around(echo)
     within = np.abs(sines) <= limit
     near = NEAR_LOBE * float(np.ptp(echo.positions[:, 0]))
     rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
     weights = survey_weights(echo)
     dominant = []
+    strongest = 0.0
     for _ in range(MOST_SOURCES):
         intensity = np.abs(backproject(echo, points, weights=weights)) ** 2
         # The lobe of what is within the sector is weaker than that.
@@ -94,6 +96,7 @@ def without_sources_aside(echo: Echo) -> Echo:
         if not tops.flat[brightest]:
             break
         place = points.reshape(-1, 3)[brightest]
+        strongest = max(strongest, float(intensity.flat[brightest]))
         left = echo.samples - _source_echo(echo, place)
         if np.linalg.norm(left) ** 2 < (1 - MOST_OF_IT) * np.linalg.norm(echo.samples) ** 2:
             dominant.append(place)
@@ -101,7 +104,7 @@ def without_sources_aside(echo: Echo) -> Echo:
     # What was fitted while others were there is left in part.
     for place in dominant:
         echo = replace(echo, samples=echo.samples - _source_echo(echo, place))
-    return echo
+    return echo, strongest
 
 
 def _all_around(
