@@ -75,13 +75,7 @@ def coherent_echo(
         shape = (len(receive.positions), scene.scenario.radio.points)
         return np.zeros(shape, dtype=np.complex128)
     echo = _over_targets(scene, among, send, receive)
-    flat = [
-        leg.sequence
-        for leg in among.chains
-        if leg.bounces <= scene.scenario.max_bounces
-        and among.by_images(leg)
-        and scene.facet_target(leg.sequence) is None
-    ]
+    flat = _flat_chains(scene, among)
     return np.asarray(echo + over_flat_faces(scene, flat, send, receive))
 
 
@@ -110,14 +104,19 @@ def coherent_pilot(
     pilot = _over_targets(scene, among, sender, receive)
     # From the user the mirrors of a leg of the array are met in turn; other chains are out of
     # the reach of the array's pattern, whatever the user's.
-    flat = [
-        leg.sequence[::-1]
+    flat = [sequence[::-1] for sequence in _flat_chains(scene, among)]
+    return np.asarray(pilot + over_flat_faces(scene, flat, sender, receive))
+
+
+def _flat_chains(scene: RadioScene, among: SceneMirrors) -> list[tuple[int, ...]]:
+    """Return the chains of faces by the image method, from the array outward."""
+    return [
+        leg.sequence
         for leg in among.chains
         if leg.bounces <= scene.scenario.max_bounces
         and among.by_images(leg)
         and scene.facet_target(leg.sequence) is None
     ]
-    return np.asarray(pilot + over_flat_faces(scene, flat, sender, receive))
 
 
 def _over_targets(
