@@ -6,7 +6,12 @@ import signal
 import sys
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 os.environ["MPLBACKEND"] = "Agg"  # no test may need a display
+# Two workers test on two cores: more threads of BLAS wait for work by spinning.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of what is loaded or started from here on
+threadpool_limits(limits=1, user_api="blas")  # numpy's, which is loaded already
 
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", None) is not None:
     # No bytecode beside the sources, then; but commands that tests start would compile all they

@@ -12,6 +12,7 @@ import numpy as np
 from estimator.array.planar_array import is_flat, spans_a_plane
 from estimator.array.viewpoint import viewpoint
 from estimator.channel.path import PathSet
+from estimator.compute.blas_threads import one_blas_thread
 from estimator.consistency.doubt import Doubted, doubted
 from estimator.consistency.pilot_curvature import pilot_lateness
 from estimator.consistency.same_samples import refuse_same_samples
@@ -76,6 +77,7 @@ def _by_shape(
     return FreeStages(view=view), told
 
 
+@one_blas_thread()
 def locate(
     measurement: Measurement,
     *,

@@ -1,7 +1,8 @@
 from .decision_rules import decide
 from .diffuse_fallback import with_diffuse_search
-from .diffuse_positioning import SeenWall, search_diffuse
+from .diffuse_positioning import search_diffuse
 from .map_context import MapContext, no_image
+from .wall_anchors import SeenWall
 from .weighted_least_squares import Consensus, Sighting, solve_position
 
 __all__ = [

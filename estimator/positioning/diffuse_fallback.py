@@ -13,8 +13,9 @@ from estimator.geometry.bearing_2d import LINEAR
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.measurement.model import Uplink
-from estimator.positioning.diffuse_positioning import DiffuseFix, SeenWall, search_diffuse
+from estimator.positioning.diffuse_positioning import DiffuseFix, search_diffuse
 from estimator.positioning.posterior import CERTAIN
+from estimator.positioning.wall_anchors import SeenWall
 from estimator.results.estimate import UserEstimate
 from estimator.walls.fitted_line import FittedLine
 

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+from threadpoolctl import threadpool_limits
+
 PATIENCE = 60.0
 """Time for which an external scheduler may have no worker. [s]"""
 
@@ -250,7 +252,8 @@ def dask_setup(worker: Any) -> None:
 
 @functools.cache
 def compute_in_one_thread() -> None:
-    """Compute in one thread; by default Dr.Jit takes all cores in every worker."""
+    """Compute in one thread; by default Dr.Jit and BLAS take all cores in every worker."""
+    threadpool_limits(limits=1, user_api="blas")
     from estimator.compute import engine
 
     if engine.backend() == "llvm":

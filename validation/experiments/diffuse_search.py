@@ -30,7 +30,8 @@ from scipy.stats import chi2
 from estimator.geometry.wall_2d import Wall
 from estimator.localization.pipeline import locate
 from estimator.measurement.model import Uplink
-from estimator.positioning.diffuse_positioning import SeenWall, search_diffuse
+from estimator.positioning.diffuse_positioning import search_diffuse
+from estimator.positioning.wall_anchors import SeenWall
 from estimator.results.estimate import Estimate, UserEstimate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate

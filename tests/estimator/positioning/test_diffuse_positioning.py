@@ -8,7 +8,8 @@ from scipy.constants import speed_of_light
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.measurement.model import Uplink
 from estimator.positioning.diffuse_fallback import with_diffuse_search
-from estimator.positioning.diffuse_positioning import SeenWall, further_distances, search_diffuse
+from estimator.positioning.diffuse_positioning import search_diffuse
+from estimator.positioning.wall_anchors import SeenWall, further_distances
 from estimator.results.estimate import PathReport, UserEstimate
 from estimator.walls.fitted_line import FittedLine
 
