@@ -33,8 +33,8 @@ from estimator.wavefronts.wave_fit_2d import (
     FittedWaves,
     WaveStart,
     fit_spherical_waves,
-    wave_field,
 )
+from estimator.wavefronts.wave_model_2d import wave_field
 
 CELLS = 2.0
 """Samples of the map for each -3 dB cell, in each direction, to start the refinement. [-]"""

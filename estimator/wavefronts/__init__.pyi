@@ -6,9 +6,9 @@ from .wave_fit_2d import (
     WaveStart,
     fit_spherical_wave,
     fit_spherical_waves,
-    wave_field,
 )
 from .wave_fit_3d import Wavefront, fit_wavefront, towards, wavefront_field
+from .wave_model_2d import wave_field
 
 __all__ = [
     "FittedWaves",

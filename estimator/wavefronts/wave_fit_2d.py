@@ -21,11 +21,19 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
+from scipy.linalg import cho_factor, cho_solve
 
-from estimator.measurement.model import UNIFORM_STEP, Uplink
+from estimator.measurement.model import Uplink
 from estimator.wavefronts.no_wave import NoWaveError
 from estimator.wavefronts.noise_variance import noise_variance
 from estimator.wavefronts.phase_error import wavefront_error
+from estimator.wavefronts.wave_model_2d import (
+    curved_part,
+    length_bends,
+    length_slopes,
+    wave_columns,
+    wave_field,
+)
 
 ITERATIONS = 40
 """Most Gauss-Newton steps; five suffice from a summit's own main lobe. [-]"""
@@ -34,10 +42,18 @@ CONVERGED = 1e-2
 FLOOR = 1e-7
 """Noise that is assumed at least, over the pilot's rms, so that a noise-free pilot converges too:
 the rounding of float64 after sums over 1e5 samples. [-]"""
+SHORTENED = 6
+"""Times that a step is halved until the residual does not grow: after these it is lost in rounding.
+[-]"""
+ROUNDING = 1e-12
+"""Growth of the residual's energy that is none: the rounding of float64 over 1e5 samples. [-]"""
 LONGEST_STEP = 0.5
 """Largest step, in main lobes: the model is linear over less. [-]"""
 LONGEST_RADIUS_STEP = 0.3
 """Largest step of a radius of curvature, over the radius. [-]"""
+MERGED = 0.1
+"""Distance of two waves, in main lobes, below which they are one: a fifth of what
+:mod:`estimator.channel.path_extraction_2d` takes for resolved. Such pairs did not converge. [-]"""
 FARTHEST = 2.0
 """Distance from its start, in main lobes, beyond which a fit has left its peak. [-]"""
 NARROWEST_BAND = 1e-3
@@ -96,45 +112,6 @@ class FittedWaves:
     residual: Complex[np.ndarray, "elements freqs"]  # the pilot less all waves [-]
 
 
-def wave_field(
-    positions: Float[np.ndarray, "elements 3"],
-    frequencies: Float[np.ndarray, " freqs"],
-    *,
-    aoa: float,
-    path_length: float,
-    radius: float,
-) -> Complex[np.ndarray, "elements freqs"]:
-    """Evaluate the model's field at unit gain, for elements in the array's frame. [-]."""
-    source = radius * np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    distances = np.linalg.norm(source - positions, axis=-1)
-    # r − R_c without cancellation, also for the huge radius of a plane wave.
-    excess = ((positions**2).sum(axis=-1) - 2 * positions @ source) / (distances + radius)
-    field: np.ndarray = (radius / distances)[:, None] * _delayed(excess + path_length, frequencies)
-    return field
-
-
-def _delayed(
-    lengths: Float[np.ndarray, " elements"], frequencies: Float[np.ndarray, " freqs"]
-) -> Complex[np.ndarray, "elements freqs"]:
-    """Evaluate exp(-jkL) for every length and frequency."""
-    per_metre = frequencies / speed_of_light
-    steps = np.diff(frequencies)
-    block = int(np.ceil(np.sqrt(frequencies.size)))
-    if frequencies.size < 4 or np.ptp(steps) > UNIFORM_STEP * steps[0]:
-        return _phasor(np.outer(lengths, per_metre))
-    # On a uniform grid the phase of frequency a·block + b is a product of two phasors.
-    step = float(per_metre[-1] - per_metre[0]) / (frequencies.size - 1)
-    coarse = _phasor(np.outer(lengths, per_metre[::block]))
-    fine = _phasor(np.outer(lengths, step * np.arange(block)))
-    field = coarse[:, :, None] * fine[:, None, :]
-    return np.ascontiguousarray(field.reshape(len(lengths), -1)[:, : frequencies.size])
-
-
-def _phasor(turns: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
-    phasor: np.ndarray = np.exp(-2j * np.pi * (turns - np.round(turns)))
-    return phasor
-
-
 def fit_spherical_wave(
     uplink: Uplink, *, aoa: float, path_length: float, radius: float | None = None
 ) -> SphericalWave:
@@ -171,15 +148,19 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
     first = [values.copy() for values in parameters]
     lobe = _main_lobe(uplink, wavenumbers)
     state = _linearised(uplink, wavenumbers, parameters)
+    floor = FLOOR * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
     for _ in range(ITERATIONS):
         bread = _inverse(state.normal, starts)
-        steps = np.split(bread @ state.scores.sum(axis=0), state.bounds)
+        steps = np.split(_ascent(state, bread), state.bounds)
         limit = max(
             _overshoot(step, values, lobe) for step, values in zip(steps, parameters, strict=True)
         )
         # Far from the peak the linear model overshoots.
         moves = [step[2:] / max(1.0, limit) for step in steps]
-        parameters = [values + move for values, move in zip(parameters, moves, strict=True)]
+        moved = _moved(uplink, wavenumbers, parameters, moves, state)
+        if moved is None:
+            break
+        last, parameters, state = state, *moved
         for values, origin, start in zip(parameters, first, starts, strict=True):
             far = np.abs(values[:2] - origin[:2]) > FARTHEST * lobe
             if np.any(far) or np.any(values <= 0):
@@ -187,15 +168,14 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
                     f"no peak within two main lobes of {np.degrees(start.aoa):.3f}°, "
                     f"{start.path_length:.4f} m"
                 )
-        noise = np.sqrt(np.mean(np.abs(state.residual) ** 2) / 2)
-        floor = FLOOR * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
+        if _merged(parameters, lobe):
+            raise NoWaveError("two waves became one")
+        noise = np.sqrt(np.mean(np.abs(last.residual) ** 2) / 2)
         deviations = np.split(np.sqrt(np.diag(bread)), state.bounds)
-        done = all(
+        if all(
             np.all(np.abs(move) < CONVERGED * deviation[2:] * max(noise, floor))
             for move, deviation in zip(moves, deviations, strict=True)
-        )
-        state = _linearised(uplink, wavenumbers, parameters)
-        if done:
+        ):
             break
     return _described(uplink, wavenumbers, parameters, starts, state)
 
@@ -208,9 +188,47 @@ class _Linear:
     fields: tuple[Complex[np.ndarray, "elements freqs"], ...]  # of each wave, with its gain
     slopes: tuple[Float[np.ndarray, "elements _"], ...]  # of its length by its parameters
     normal: Float[np.ndarray, "all all"]  # JᵀJ
+    hessian: Float[np.ndarray, "all all"]  # JᵀJ less what the model's curvature takes of it
     scores: Float[np.ndarray, "elements all"]  # each element's Jᵀe
     residual: Complex[np.ndarray, "elements freqs"]
     bounds: list[int]  # where the columns of one wave end
+
+
+def _merged(parameters: Sequence[Float[np.ndarray, " _"]], lobe: Float[np.ndarray, " 2"]) -> bool:
+    """Tell whether two waves are so near that they describe one, whose front roughness bends."""
+    places = np.array([[np.cos(values[0]), values[1]] for values in parameters]) / lobe
+    apart = np.abs(places[:, None] - places).max(axis=-1)
+    return bool((apart[np.triu_indices(len(places), k=1)] < MERGED).any())
+
+
+def _ascent(state: _Linear, bread: Float[np.ndarray, "all all"]) -> Float[np.ndarray, " all"]:
+    """Return Newton's step, or Gauss and Newton's where the likelihood is not concave.
+
+    What roughness bends, or two waves closer than a cell, leave residuals so large that Gauss and
+    Newton's steps fall by a few percent each.
+    """
+    scores = state.scores.sum(axis=0)
+    try:
+        return np.asarray(cho_solve(cho_factor(state.hessian), scores))
+    except np.linalg.LinAlgError:
+        return np.asarray(bread @ scores)
+
+
+def _moved(
+    uplink: Uplink,
+    wavenumbers: Float[np.ndarray, " freqs"],
+    parameters: Sequence[Float[np.ndarray, " _"]],
+    moves: Sequence[Float[np.ndarray, " _"]],
+    state: _Linear,
+) -> tuple[list[Float[np.ndarray, " _"]], _Linear] | None:
+    """Take a step, shortened until the residual falls; None: it falls no more."""
+    before = float(np.vdot(state.residual, state.residual).real)
+    for shorter in range(SHORTENED + 1):
+        there = [values + move / 2**shorter for values, move in zip(parameters, moves, strict=True)]
+        taken = _linearised(uplink, wavenumbers, there)
+        if float(np.vdot(taken.residual, taken.residual).real) <= before * (1 + ROUNDING):
+            return there, taken
+    return None
 
 
 def _main_lobe(uplink: Uplink, wavenumbers: Float[np.ndarray, " freqs"]) -> Float[np.ndarray, " 2"]:
@@ -264,14 +282,15 @@ def _linearised(
         raise NoWaveError("two waves became one") from None
     fields = tuple(gain * unit for gain, unit in zip(gains, units, strict=True))
     residual = uplink.samples - sum(fields)
-    slopes = tuple(_slopes(uplink, values) for values in parameters)
+    slopes = tuple(length_slopes(uplink, values) for values in parameters)
     # With J = wave·(1, j, −jk·slope), JᵀJ and Jᵀe separate into sums over frequency.
     powers = wavenumbers[:, None] ** np.arange(3)
-    columns = [_columns(one) for one in slopes]
-    scores = []
+    columns = [wave_columns(one) for one in slopes]
+    scores, explained = [], []
     for field, (shape, order) in zip(fields, columns, strict=True):
-        matched = (np.conj(field) * residual) @ powers[:, :2]
+        matched = (np.conj(field) * residual) @ powers
         scores.append((np.conj(shape) * matched[:, order]).real)
+        explained.append(matched)
     ends = np.cumsum([shape.shape[1] for shape, _ in columns])
     sums = powers.sum(axis=0)
 
@@ -293,41 +312,20 @@ def _linearised(
             across = slice(ends[j] - len(higher), ends[j])
             normal[rows, across] = block
             normal[across, rows] = block.T
+    hessian = normal.copy()
+    for matched, slope, values, end in zip(explained, slopes, parameters, ends, strict=True):
+        own = slice(end - 2 - len(values), end)
+        hessian[own, own] -= curved_part(matched, slope, length_bends(uplink, values))
     return _Linear(
         gains=gains,
         fields=fields,
         slopes=slopes,
         normal=normal,
+        hessian=hessian,
         scores=np.concatenate(scores, axis=1),
         residual=residual,
         bounds=[int(end) for end in ends[:-1]],
     )
-
-
-def _slopes(
-    uplink: Uplink, values: Float[np.ndarray, " parameters"]
-) -> Float[np.ndarray, "elements parameters"]:
-    """Differentiate the length r − R_c + R by (aoa, R[, R_c]), for each element."""
-    aoa, radius = float(values[0]), float(values[-1])
-    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    turned = np.array([-np.sin(aoa), np.cos(aoa), 0.0])
-    reach = radius * towards - uplink.positions
-    reach = reach / np.linalg.norm(reach, axis=-1, keepdims=True)
-    bend = reach @ towards
-    free = len(values) == 3
-    lengths = [radius * (reach @ turned), np.ones_like(bend) if free else bend]
-    if free:
-        lengths.append(bend - 1)
-    return np.stack(lengths, axis=-1)
-
-
-def _columns(
-    slopes: Float[np.ndarray, "elements parameters"],
-) -> tuple[Complex[np.ndarray, "elements columns"], np.ndarray]:
-    """Return the factors of a wave's columns of J, and the power of k that each one has."""
-    ones = np.ones(len(slopes))
-    shape = np.column_stack([ones, 1j * ones, -1j * slopes])
-    return shape, np.array([0, 0] + [1] * slopes.shape[1])
 
 
 def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) -> np.ndarray:
