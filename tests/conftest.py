@@ -8,6 +8,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from tests import type_checks
+
 os.environ["MPLBACKEND"] = "Agg"  # no test may need a display
 # Two workers test on two cores: more threads of BLAS wait for work by spinning.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of what is loaded or started from here on
@@ -25,3 +27,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 importlib.import_module("estimator")
+
+
+def pytest_runtest_setup() -> None:
+    """Check the first calls of each function anew."""
+    type_checks.begin()

@@ -24,7 +24,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 SMALL = [
     "slam_2d",
     "--set=base_station.elements=101",
-    "--set=radio.points=501",
+    "--set=radio.points=351",
     "--set=objects.wall.centre_m=[0.0, 0.4]",
     "--set=objects.wall.length_m=0.2",
     "--set=users.user.position_m=[0.5, 0.4]",

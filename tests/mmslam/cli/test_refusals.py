@@ -1,8 +1,8 @@
 """What cannot be is refused before anything slow is loaded, with what to do about it."""
 
+import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import trimesh
@@ -12,10 +12,15 @@ SLOW = ("drjit", "matplotlib", "mitsuba", "sionna", "trimesh")
 0.6 s of the processor, once Python has compiled the package."""
 
 COMMAND = f"""
-import atexit, runpy, sys
-loaded = lambda: print("loaded:", *sorted(set({SLOW!r}) & set(sys.modules)), file=sys.stderr)
-atexit.register(loaded)
-runpy.run_module("mmslam", run_name="__main__", alter_sys=True)
+import json, runpy, sys
+for arguments in json.loads(sys.stdin.read()):
+    sys.argv = ["mmslam", *arguments]
+    try:
+        runpy.run_module("mmslam", run_name="__main__", alter_sys=True)
+    except SystemExit as ended:
+        loaded = sorted(set({SLOW!r}) & set(sys.modules))
+        print("code:", ended.code, "loaded:", *loaded, file=sys.stderr)
+        print("=" * 9, file=sys.stderr, flush=True)
 """
 
 POST = {"objects.post.kind": "cylinder", "objects.post.material": "metal"}
@@ -25,75 +30,85 @@ BOX = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("scenario", "overrides", "message"),
-    [
-        (
-            "slam_2d",
-            {**POST, **BOX, "objects.post.centre_m": "[1, 2.05]", "objects.post.radius_m": "0.1"},
-            "overlaps objects.post; solids may touch (to 1 µm), not overlap; move or shrink",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.scale": "0.05", "objects.sphere.centre_m": "[0, 0.38, 0]"},
-            "objects.sphere.centre_m = [0.0, 0.38]: the solid overlaps objects.letter; solids",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.scale": "1.0", "objects.sphere.centre_m": "[0, 30, 0]"},
-            "objects.sphere: needs 7.78e+08 facets at a spacing of 0.254 mm, all objects 92.7 GiB, "
-            "more than 16 GiB; make it smaller, lower radio.stop_ghz, or raise",
-        ),
-        (
-            "slam_2d",
-            {"objects.wall.length_m": "1000", "objects.wall.roughness.correlation_mm": "1e-4"},
-            "more than 16 GiB; make it smaller",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.material": "drywal"},
-            "objects.sphere.material = 'drywal': unknown material (did you mean 'drywall'?); use",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.file": "none.ply"},
-            "No such file or directory; give the path of a mesh, relative to the scenario's file",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.file": "FOLDER/empty.ply"},
-            "a file of 1 byte to 2 GiB is needed, this has 0 bytes; export the mesh again",
-        ),
-        (
-            "bench_3d",
-            {"objects.sphere.file": "FOLDER/open.ply", "objects.sphere.solid": "true"},
-            "of its edges do not belong to exactly two triangles, and solid = true needs a "
-            "watertight mesh; close its holes and export it again, or set solid = false",
-        ),
-        (
-            "slam_2d",
-            {"objects.wall.material": '{file = "FOLDER/table.csv", thickness_mm = 5}'},
-            "table.csv: 0.5 - 0j is no permittivity of a passive dielectric; the real part must",
-        ),
-    ],
-    ids=[
-        "overlap", "overlapping meshes", "mesh facets", "facets", "material", "missing", "empty",
-        "open", "table",
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_refused_before_anything_slow_is_loaded(
-    scenario: str, overrides: dict[str, str], message: str, tmp_path: Path
-) -> None:
-    (tmp_path / "empty.ply").touch()
-    (tmp_path / "table.csv").write_text("frequency_ghz,eps_real,eps_imag\n220,0.5,0\n330,2,0\n")
+CASES: dict[str, tuple[str, dict[str, str], str]] = {
+    "overlap": (
+        "slam_2d",
+        {**POST, **BOX, "objects.post.centre_m": "[1, 2.05]", "objects.post.radius_m": "0.1"},
+        "overlaps objects.post; solids may touch (to 1 µm), not overlap; move or shrink",
+    ),
+    "overlapping meshes": (
+        "bench_3d",
+        {"objects.sphere.scale": "0.05", "objects.sphere.centre_m": "[0, 0.38, 0]"},
+        "objects.sphere.centre_m = [0.0, 0.38]: the solid overlaps objects.letter; solids",
+    ),
+    "mesh facets": (
+        "bench_3d",
+        {"objects.sphere.scale": "1.0", "objects.sphere.centre_m": "[0, 30, 0]"},
+        "objects.sphere: needs 7.78e+08 facets at a spacing of 0.254 mm, all objects 92.7 GiB, "
+        "more than 16 GiB; make it smaller, lower radio.stop_ghz, or raise",
+    ),
+    "facets": (
+        "slam_2d",
+        {"objects.wall.length_m": "1000", "objects.wall.roughness.correlation_mm": "1e-4"},
+        "more than 16 GiB; make it smaller",
+    ),
+    "material": (
+        "bench_3d",
+        {"objects.sphere.material": "drywal"},
+        "objects.sphere.material = 'drywal': unknown material (did you mean 'drywall'?); use",
+    ),
+    "missing": (
+        "bench_3d",
+        {"objects.sphere.file": "none.ply"},
+        "No such file or directory; give the path of a mesh, relative to the scenario's file",
+    ),
+    "empty": (
+        "bench_3d",
+        {"objects.sphere.file": "FOLDER/empty.ply"},
+        "a file of 1 byte to 2 GiB is needed, this has 0 bytes; export the mesh again",
+    ),
+    "open": (
+        "bench_3d",
+        {"objects.sphere.file": "FOLDER/open.ply", "objects.sphere.solid": "true"},
+        "of its edges do not belong to exactly two triangles, and solid = true needs a "
+        "watertight mesh; close its holes and export it again, or set solid = false",
+    ),
+    "table": (
+        "slam_2d",
+        {"objects.wall.material": '{file = "FOLDER/table.csv", thickness_mm = 5}'},
+        "table.csv: 0.5 - 0j is no permittivity of a passive dielectric; the real part must",
+    ),
+}
+"""A scenario, what is changed in it, and what the refusal says."""
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What a command says to each case: one process tries them all, so that it starts once."""
+    folder = tmp_path_factory.mktemp("refused")
+    (folder / "empty.ply").touch()
+    (folder / "table.csv").write_text("frequency_ghz,eps_real,eps_imag\n220,0.5,0\n330,2,0\n")
     sphere = trimesh.creation.icosphere(subdivisions=4)
     sphere.update_faces([*range(0, len(sphere.faces), 2)])
-    sphere.export(tmp_path / "open.ply")
-    command = [sys.executable, "-c", COMMAND, "simulate", scenario, "-o", "none.zarr"]
-    for key, value in overrides.items():
-        command += ["--set", f"{key}={value.replace('FOLDER', str(tmp_path))}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert message in " ".join(done.stderr.split())
-    assert not Path("none.zarr").exists()
-    assert done.stderr.splitlines()[-1] == "loaded:"
+    sphere.export(folder / "open.ply")
+    commands = []
+    for scenario, overrides, _ in CASES.values():
+        command = ["simulate", scenario, "-o", str(folder / "none.zarr")]
+        for key, value in overrides.items():
+            command += ["--set", f"{key}={value.replace('FOLDER', str(folder))}"]
+        commands.append(command)
+    done = subprocess.run(
+        [sys.executable, "-c", COMMAND],
+        input=json.dumps(commands), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == ""
+    assert not (folder / "none.zarr").exists()
+    return dict(zip(CASES, done.stderr.split("=" * 9 + "\n"), strict=False))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_cannot_be_is_refused_before_anything_slow_is_loaded(
+    case: str, refusals: dict[str, str]
+) -> None:
+    assert CASES[case][2] in " ".join(refusals[case].split())
+    assert refusals[case].splitlines()[-1] == "code: 2 loaded:"

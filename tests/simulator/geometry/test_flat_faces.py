@@ -116,7 +116,7 @@ def test_a_point_on_the_seam_of_two_mirrors_is_on_one_of_them() -> None:
 
 def room(folder: Path, cuts: int, shift: float = 0.0) -> np.ndarray:
     """Simulate the uplink in a hollow metal room, cut into 12 · 4^cuts triangles."""
-    box = mesh(trimesh.creation.box((1.2, 1.0, 0.8)), cuts)
+    box = mesh(trimesh.creation.box((0.6, 0.5, 0.4)), cuts)
     path = folder / f"room_{cuts}.ply"
     path.write_bytes(ply_bytes(box.vertices, box.faces))
     table = {"kind": "mesh", "material": "metal", "file": str(path), "hollow": True}
@@ -125,15 +125,15 @@ def room(folder: Path, cuts: int, shift: float = 0.0) -> np.ndarray:
             "name": "room",
             "dimensions": 3,
             "max_bounces": 2,
-            "radio": {"start_ghz": 10.0, "stop_ghz": 11.0, "points": 21},
+            "radio": {"start_ghz": 10.0, "stop_ghz": 11.0, "points": 11},
             "base_station": {
                 "elements": [1, 1],
                 "spacing_mm": 15.0,
-                "position_m": [shift - 0.36, -0.3 - shift, 0.1],
+                "position_m": [shift - 0.18, -0.15 - shift, 0.05],
             },
             "objects": {"room": {**table, "centre_m": [shift, -shift, 0.0]}},
             # In the plane of the diagonals of floor and ceiling, where triangles meet.
-            "users": {"ann": {"position_m": [shift + 0.24, 0.2 - shift, -0.15]}},
+            "users": {"ann": {"position_m": [shift + 0.12, 0.1 - shift, -0.075]}},
         }
     )
     return np.asarray(simulate(scenario, seed=0).measurement.uplinks[0].samples)
