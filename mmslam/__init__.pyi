@@ -8,7 +8,7 @@ from .full_wave import simulate_full_wave
 from .library import Scenario, load_scenario, scenarios
 from .location import locate
 from .measured_data import import_measured
-from .measurement import Echo, Measurement, Uplink
+from .measurement import Echo, Measurement, PathList, Uplink
 from .measurement_files import read, write
 from .pipeline import simulate
 from .results.estimate import Estimate
@@ -19,6 +19,7 @@ __all__ = [
     "Echo",
     "Estimate",
     "Measurement",
+    "PathList",
     "Scenario",
     "SionnaChannel",
     "Uplink",

@@ -16,12 +16,12 @@ from jaxtyping import Complex, Float
 from numpy.typing import ArrayLike
 
 from estimator.measurement import model
-from estimator.measurement.model import Echo, MeasurementError, Uplink, Waves
+from estimator.measurement.model import Echo, MeasurementError, PathList, Uplink, Waves
 from estimator.measurement.store import measurement_to_dataset
 from mmslam.table import Table, html, text
 from validation.metrics.truth import Truth, read_truth_dataset, truth_from_dataset
 
-__all__ = ["Echo", "Measurement", "TruthFile", "Uplink"]
+__all__ = ["Echo", "Measurement", "PathList", "TruthFile", "Uplink"]
 
 USER = "user"
 """Default name of the user of a single pilot."""
@@ -168,16 +168,23 @@ class Measurement(model.Measurement):
 
     def table(self) -> Table:
         """Return what it holds, in a few rows."""
-        measured = self.echo or self.uplinks[0]
+        measured = self.echo or next(iter(self.uplinks), None)
         users = [uplink.user for uplink in self.uplinks]
         held = ["echo"] if self.echo else []
         held += [f"uplink{'s' if len(users) > 1 else ''} of {', '.join(users)}"] if users else []
-        size = 1e3 * float(np.linalg.norm(np.ptp(measured.positions, axis=0)))
-        low, high = 1e-9 * measured.frequencies[[0, -1]]
+        listed = sum(one.azimuth.size for one in self.path_lists)
+        held += [f"{listed} paths of {len(self.path_lists)} places"] if listed else []
+        sweep = []
+        if measured is not None:
+            size = 1e3 * float(np.linalg.norm(np.ptp(measured.positions, axis=0)))
+            low, high = 1e-9 * measured.frequencies[[0, -1]]
+            sweep = [
+                ("positions", f"{len(measured.positions)} over {size:.4g} mm"),
+                ("frequencies", f"{measured.frequencies.size} from {low:.5g} to {high:.5g} GHz"),
+            ]
         clock = "unknown" if self.clock_offset is None else f"{1e9 * self.clock_offset:g} ns off"
         rows = [
-            ("positions", f"{len(measured.positions)} over {size:.4g} mm"),
-            ("frequencies", f"{measured.frequencies.size} from {low:.5g} to {high:.5g} GHz"),
+            *sweep,
             ("clock", clock if self.clock_offset else clock.replace("0 ns off", "shared")),
             ("truth", "unknown" if self.beside is None else "beside it"),
             *(("note", note) for note in self.notes),

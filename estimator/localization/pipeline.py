@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.array.array_frame import ArrayFrame
 from estimator.array.planar_array import is_flat, spans_a_plane
 from estimator.array.viewpoint import viewpoint
 from estimator.channel.path import PathSet
@@ -22,6 +23,7 @@ from estimator.imaging.scene_image import ImageOptions
 from estimator.localization.clock import clock_note, on_our_clock
 from estimator.localization.close_up import close_up
 from estimator.localization.frames import local_echo, local_uplink, user_in_world
+from estimator.localization.listed_users import paths_of_list
 from estimator.localization.stages import MappedRoom, Stages
 from estimator.localization.stages_2d import LinearStages
 from estimator.localization.stages_3d import PlanarStages
@@ -34,6 +36,7 @@ from estimator.measurement.model import (
     Uplink,
     frequency_step,
 )
+from estimator.path_consensus.consensus import PathListAnswer, locate_path_lists
 from estimator.positioning.decision_rules import decide
 from estimator.positioning.map_context import MapContext, no_image
 from estimator.results.deferred import Deferred
@@ -66,7 +69,7 @@ def _stages(
 def _by_shape(
     measurement: Measurement,
 ) -> tuple[LinearStages | PlanarStages | FreeStages, tuple[str, ...]]:
-    measured = measurement.echo or measurement.uplinks[0]
+    measured = measurement.echo or measurement.uplinks[0]  # lists alone have no array
     places = middles(measured) if isinstance(measured, Echo) else measured.positions
     if not spans_a_plane(places):
         return LinearStages(), ()
@@ -111,6 +114,8 @@ def locate(
         the frequency grid is not uniform, the waves are such as an array of its shape cannot
         take, or a region is empty or comes without an echo.
     """
+    if measurement.echo is None and not measurement.uplinks:
+        return _by_lists(measurement, region)
     measured = measurement.echo or measurement.uplinks[0]
     stages, assumed = _stages(measurement, region)
     tell = progress or (lambda stage, done, total: None)
@@ -123,7 +128,7 @@ def locate(
         for uplink in uplinks:
             refuse_same_samples(echo, uplink)
     frame = stages.frame(measurement)
-    steps = 2 + len(uplinks)
+    steps = 2 + len(uplinks) + bool(measurement.path_lists)
 
     tell("estimate", 0, steps)
     room: MappedRoom | None = None
@@ -156,6 +161,15 @@ def locate(
         timings[f"user {uplink.user}"] = time.perf_counter() - started
         tell("estimate", 2 + index, steps)
 
+    if measurement.path_lists:
+        started = time.perf_counter()
+        context = no_image() if room is None else room.context
+        linear = isinstance(stages, LinearStages)
+        beside = _beside_echo(measurement, frame, context, linear=linear)
+        users += beside.users
+        notes += beside.notes
+        timings["path lists"] = time.perf_counter() - started
+
     def formed() -> Images:
         started = time.perf_counter()
         ends = [frame.to_local(user.path) for user in users if user.path is not None]
@@ -183,6 +197,41 @@ def locate(
     if not images:
         return estimate
     return replace(estimate, images=Deferred(formed), close_up_maps=Deferred(closer))
+
+
+def _by_lists(measurement: Measurement, region: ImageOptions | None) -> Estimate:
+    """Locate the users of path lists where nothing else was measured."""
+    if region is not None:
+        raise MeasurementError("a region was asked for, but no echo was measured: leave it out")
+    started = time.perf_counter()
+    found = locate_path_lists(measurement.path_lists, clock_offset=measurement.clock_offset)
+    return Estimate(
+        users=found.users,
+        mirrors=found.mirrors,
+        notes=found.notes,
+        timings={"path lists": time.perf_counter() - started},
+    )
+
+
+def _beside_echo(
+    measurement: Measurement, frame: ArrayFrame, context: MapContext, *, linear: bool
+) -> PathListAnswer:
+    """Locate the users of path lists over the walls that an echo shows."""
+    lists, offset = measurement.path_lists, measurement.clock_offset
+    if offset is None or not context.imaged:
+        found = locate_path_lists(lists, clock_offset=offset)
+        why = "the users' clock is unknown" if context.imaged else "the echo shows no room"
+        note = f"{why}: lists of paths are located by the mirrors that they agree on themselves"
+        return replace(found, mirrors=(), notes=(*found.notes, note))
+    users, left = [], 0
+    for one in lists:
+        paths, out = paths_of_list(one, frame, linear=linear, clock_offset=offset)
+        left += out
+        users.append(user_in_world(decide(one.user, paths, context), frame))
+    notes: tuple[str, ...] = ()
+    if left:
+        notes = (f"{left} listed paths come from behind the array or are faint; they were left",)
+    return PathListAnswer(users=tuple(users), mirrors=(), notes=notes)
 
 
 def _compared(

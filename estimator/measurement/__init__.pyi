@@ -9,6 +9,7 @@ from .constant_signal import SharedSignal, shared_signal, without_delays, withou
 from .delay_by_focus import FocusDelay, focus_delay
 from .frequency_resampling import EqualSteps, to_equal_steps
 from .model import Echo, Measurement, MeasurementError, Uplink, Waves, frequency_step
+from .path_list import PathList
 from .store import is_store, measurement_to_dataset, read_measurement, write_measurement
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "FocusDelay",
     "Measurement",
     "MeasurementError",
+    "PathList",
     "SharedSignal",
     "Uplink",
     "Waves",

@@ -12,15 +12,24 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float
 
+from estimator.measurement.errors import MeasurementError
+from estimator.measurement.path_list import PathList
+
+__all__ = [
+    "Echo",
+    "Measurement",
+    "MeasurementError",
+    "PathList",
+    "Uplink",
+    "Waves",
+    "frequency_step",
+]
+
 Waves = Literal["spherical", "cylindrical"]
 
 UNIFORM_STEP = 1e-6
 """Largest departure from a uniform frequency grid, over the step: 1e-6 of 75 MHz at 2 m of
 range is 1e-6 rad, far below any noise. [-]"""
-
-
-class MeasurementError(ValueError):
-    """A measurement cannot be used; the message names the variable, the value and the remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +91,7 @@ class Measurement:
     clock_offset: float | None = None  # user's clock minus ours; None: unknown [s]
     scenario: str | None = None
     seed: int | None = None
+    path_lists: tuple[PathList, ...] = ()  # of users whose channels were not kept
 
     def __post_init__(self) -> None:
         """Refuse a measurement without data."""
@@ -90,8 +100,10 @@ class Measurement:
             raise MeasurementError(
                 f"boresight = {self.boresight.tolist()} has length {length:g}; give a unit vector"
             )
-        if self.echo is None and not self.uplinks:
-            raise MeasurementError("the measurement has neither 'echo' nor 'uplink': give one")
+        if self.echo is None and not self.uplinks and not self.path_lists:
+            raise MeasurementError(
+                "the measurement has neither 'echo' nor 'uplink' nor lists of paths: give one"
+            )
         grids = [uplink.frequencies for uplink in self.uplinks]
         grids += [self.echo.frequencies] if self.echo else []
         if any(not np.array_equal(grid, grids[0]) for grid in grids):
@@ -103,6 +115,17 @@ class Measurement:
             raise MeasurementError(
                 "the uplinks have different element positions; one array receives all users"
             )
+        users = [uplink.user for uplink in self.uplinks]
+        users += [listed.user for listed in self.path_lists]
+        if self.path_lists and len(set(users)) < len(users):
+            twice = next(user for user in users if users.count(user) > 1)
+            raise MeasurementError(f"two users are called {twice!r}; name them differently")
+
+    @property
+    def places(self) -> Float[np.ndarray, "positions 3"]:
+        """Phase centres of the echo, else of the uplinks, else the base station's place. [m]."""
+        measured = self.echo or next(iter(self.uplinks), None)
+        return np.zeros((1, 3)) if measured is None else measured.positions
 
 
 def frequency_step(frequencies: Float[np.ndarray, " freqs"]) -> float:

@@ -9,6 +9,7 @@ Layout (dimensions in brackets)::
     element_position [element, axis]      m
     frequency [frequency]                 Hz
     user [user]                           labels
+    path_… [path], [path_list]            lists of paths, see :mod:`.path_list_store`
     truth/                                never opened here for an estimate
 
 A dataset has a leading dimension ``sample``. What differs in length between its samples is
@@ -34,6 +35,7 @@ from estimator.measurement.guarded_store import (
     shortened,
 )
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.path_list_store import LISTS, path_list_variables, read_path_lists
 from estimator.measurement.store_attributes import finite_number, unit_boresight, whole_seed
 
 FORMAT = 1
@@ -84,12 +86,14 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
     labels = np.array(
         [uplink.user for uplink in measurement.uplinks], dtype=np.dtypes.StringDType()
     )
-    coordinates = {
-        "frequency": ("frequency", frequencies, {"units": "Hz"}),
-        "axis": ("axis", np.array(["x", "y", "z"], dtype=np.dtypes.StringDType())),
+    variables |= path_list_variables(measurement.path_lists)
+    coordinates: dict[str, tuple[str, np.ndarray, dict[str, str]]] = {
+        "axis": ("axis", np.array(["x", "y", "z"], dtype=np.dtypes.StringDType()), {}),
     }
+    if measurement.echo or measurement.uplinks:
+        coordinates["frequency"] = ("frequency", frequencies, {"units": "Hz"})
     if measurement.uplinks:
-        coordinates["user"] = ("user", labels)
+        coordinates["user"] = ("user", labels, {})
     dataset = xr.Dataset(variables, coordinates)
     dataset.attrs = {
         "mmslam_format": FORMAT,
@@ -296,11 +300,13 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
             f"{path}: format {shortened(repr(version))}, this program reads {FORMAT}; use a "
             "matching version"
         )
-    if "echo" not in dataset and "uplink" not in dataset:
+    if "echo" not in dataset and "uplink" not in dataset and LISTS not in dataset:
         found = shortened(", ".join(map(str, dataset.data_vars)) or "none")
         raise MeasurementError(f"{path}: neither 'echo' nor 'uplink' is there (found: {found})")
-    frequencies = _array(path, dataset, "frequency", ("frequency",), float)
     echo = None
+    frequencies = np.zeros(0)
+    if "echo" in dataset or "uplink" in dataset:
+        frequencies = _array(path, dataset, "frequency", ("frequency",), float)
     if "echo" in dataset:
         echo = Echo(
             samples=_array(path, dataset, "echo", ("position", "frequency"), complex),
@@ -334,6 +340,7 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
         clock_offset=finite_number(path, attributes, "clock_offset_s"),
         scenario=None if (name := attributes.get("scenario")) is None else str(name),
         seed=whole_seed(path, attributes),
+        path_lists=read_path_lists(path, dataset),
     )
 
 

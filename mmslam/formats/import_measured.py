@@ -20,7 +20,7 @@ from estimator.measurement.constant_signal import (
     without_delays,
     without_shared_signal,
 )
-from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
+from estimator.measurement.model import Echo, Measurement, MeasurementError, PathList, Uplink
 from mmslam.formats.array_reader import FILES, ArrayReader
 from mmslam.formats.checks.boresight import boresight_of
 from mmslam.formats.checks.focus_check import delay_by_focus, focus_notes
@@ -32,6 +32,7 @@ from mmslam.formats.measured_signals import (
     SignalReader,
     told,
 )
+from mmslam.formats.path_lists import import_path_lists
 from mmslam.formats.plausibility import sign_note, strength_note
 from mmslam.formats.tables.signal_tables import EchoTable, SignalTable
 from mmslam.formats.touchstone_files import SUFFIX
@@ -71,6 +72,11 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
         raise MeasurementError(
             f"{source}: one Touchstone file is one position; give the folder of all of them"
         )
+    lists: tuple[PathList, ...] = ()
+    if mapping.paths is not None:
+        lists = import_path_lists(source, mapping.paths, base)
+        if not mapping.signals():
+            return _lists_alone(source, mapping, lists)
     reader: SignalReader = (
         FolderReader(source, mapping, base)
         if source.is_dir() and not _holds_arrays(mapping)
@@ -131,8 +137,22 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             boresight=boresight,
             clock_offset=None if clock is None else clock / 1e9,
             scenario=mapping.scenario or source.resolve().stem,
+            path_lists=lists,
         )
     return Import(measurement=measurement, notes=tuple(dict.fromkeys(notes)))
+
+
+def _lists_alone(source: Path, mapping: SweepMapping, lists: tuple[PathList, ...]) -> Import:
+    clock = mapping.clock_offset_ns
+    measurement = Measurement(
+        echo=None,
+        uplinks=(),
+        boresight=np.array(mapping.boresight),
+        clock_offset=None if clock is None else clock / 1e9,
+        scenario=mapping.scenario or source.resolve().stem,
+        path_lists=lists,
+    )
+    return Import(measurement=measurement, notes=())
 
 
 def _holds_arrays(mapping: SweepMapping) -> bool:

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.tables.frequency_table import FrequencyTable
+from mmslam.formats.tables.path_table import PathTable
 from mmslam.formats.tables.position_table import PositionTable
 from mmslam.formats.tables.signal_tables import EchoTable, SignalTable
 from mmslam.formats.tables.sources import Name, Vector
@@ -68,10 +69,14 @@ class SweepMapping(Checked):
         default={}, description="a table for each user's pilot, by name"
     )
 
+    paths: PathTable | None = Field(
+        default=None, description="the table of a sounder's path lists: no channel was kept"
+    )
+
     @model_validator(mode="after")
     def _something(self) -> "SweepMapping":
-        if self.echo is None and not self.uplinks:
-            raise ValueError("neither [echo] nor [uplinks.NAME] is there; give one")
+        if self.echo is None and not self.uplinks and self.paths is None:
+            raise ValueError("neither [echo] nor [uplinks.NAME] nor [paths] is there; give one")
         if sum(one is not None for one in (self.frequency, self.time, self.chirp)) > 1:
             raise ValueError("give one of [frequency], [time] and [chirp]")
         if self.band_ghz is not None and not 0 <= self.band_ghz[0] < self.band_ghz[1]:

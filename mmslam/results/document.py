@@ -109,6 +109,9 @@ def versions() -> dict[str, str | None]:
 
 def dimensions(measurement: Measurement) -> int:
     """Return 2 if the aperture is a line (its answer lies in the plane z = 0), else 3."""
+    lists = measurement.path_lists
+    if measurement.echo is None and not measurement.uplinks:
+        return 2 if any(one.elevation is None for one in lists) else 3
     positions = np.concatenate(
         [part.positions for part in (measurement.echo, *measurement.uplinks) if part is not None]
     )

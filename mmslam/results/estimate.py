@@ -248,7 +248,7 @@ class Estimate(_Shown, plain.Estimate):
             "mirrors": tuple(_as(Mirror, one) for one in estimate.mirrors),
             "targets": tuple(_as(Target, one) for one in estimate.targets),
             "maps": tuple(_as(AngleRangeMap, one) for one in estimate.maps),
-            "aperture": (measurement.echo or measurement.uplinks[0]).positions,
+            "aperture": measurement.places,
         }
         return cls(**parts, measurement=measurement)
 

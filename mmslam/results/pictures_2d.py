@@ -92,9 +92,8 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def aperture(measurement: Measurement) -> Float[np.ndarray, "positions 3"]:
-    """Return the phase centres of the echo, or else of the first uplink [m]."""
-    measured = measurement.echo or measurement.uplinks[0]
-    return measured.positions
+    """Return the phase centres of the echo, else of the first uplink, else the base station [m]."""
+    return measurement.places
 
 
 def image_figure(

@@ -14,6 +14,8 @@ _CLOSE_UPS = 3
 
 def in_space(estimate: Estimate) -> bool:
     """Tell whether an estimate is one of a planar array."""
+    if any(mirror.corners is not None for mirror in estimate.mirrors):
+        return True
     if estimate.maps or estimate.direction_maps:
         return bool(estimate.direction_maps)
     image = estimate.raw_image

@@ -77,7 +77,13 @@ def render_report(
 
 def radio_parameters(measurement: Measurement) -> dict[str, str]:
     """Describe the sweep in the units that people use, each with its unit."""
-    measured = measurement.echo or measurement.uplinks[0]
+    measured = measurement.echo or next(iter(measurement.uplinks), None)
+    if measured is None:
+        paths = sum(one.azimuth.size for one in measurement.path_lists)
+        return {
+            "frequencies": "lists of paths, no channels",
+            "positions": f"{paths} paths of {len(measurement.path_lists)} places",
+        }
     frequencies, positions = measured.frequencies, measured.positions
     described = {
         "frequencies": f"{frequencies[0] / 1e9:g} to {frequencies[-1] / 1e9:g} GHz, "

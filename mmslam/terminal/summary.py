@@ -36,14 +36,17 @@ def summary_lines(result: Mapping[str, Any], folder: Path) -> Iterator[str]:
 
 def measurement_summary(measurement: Measurement) -> dict[str, Any]:
     """Count what a measurement holds."""
-    measured = measurement.echo or measurement.uplinks[0]
+    measured = measurement.echo or next(iter(measurement.uplinks), None)
     return {
         "scenario": measurement.scenario,
         "seed": measurement.seed,
-        "positions": len(measured.positions),
-        "frequencies": len(measured.frequencies),
+        "positions": len(measurement.places),
+        "frequencies": 0 if measured is None else len(measured.frequencies),
         "echo": measurement.echo is not None,
-        "users": [uplink.user for uplink in measurement.uplinks],
+        "users": [
+            *(uplink.user for uplink in measurement.uplinks),
+            *(listed.user for listed in measurement.path_lists),
+        ],
     }
 
 

@@ -1,4 +1,5 @@
 from .frequency_table import FrequencyTable
+from .path_table import PathTable
 from .position_table import PositionTable
 from .signal_tables import EchoTable, RawTable, ResponseTable, SamplesTable, SignalTable
 from .time_tables import ChirpTable, TimeTable
@@ -7,6 +8,7 @@ __all__ = [
     "ChirpTable",
     "EchoTable",
     "FrequencyTable",
+    "PathTable",
     "PositionTable",
     "RawTable",
     "ResponseTable",

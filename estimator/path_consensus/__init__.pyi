@@ -1,0 +1,3 @@
+from .consensus import PathListAnswer, locate_path_lists
+
+__all__ = ["PathListAnswer", "locate_path_lists"]
