@@ -72,6 +72,7 @@ def test_matrices_are_places_times_paths_with_gaps(tmp_path: Path, take: Take) -
     assert [one.azimuth.size for one in lists] == [2, 1]
     np.testing.assert_allclose(np.degrees(lists[0].azimuth), [80, 70])  # from +x, the other way
     np.testing.assert_allclose(lists[1].delay, [35e-9])
+    assert lists[1].gain_db is not None
     np.testing.assert_allclose(lists[1].gain_db, [-80])
     assert lists[0].elevation is None
 
