@@ -25,15 +25,19 @@ def begin() -> None:
 
 def first_calls(function: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap a function so that beartype checks its first calls in each test."""
-    checked = beartype(function)
+    checked: Callable[..., Any] | None = None
     test, calls = 0, 0
 
     @functools.wraps(function)
     def some_checked(*arguments: Any, **options: Any) -> Any:
-        nonlocal test, calls
+        nonlocal checked, test, calls
         if test != _tests:
             test, calls = _tests, 0
         calls += 1
-        return (checked if calls <= FIRST else function)(*arguments, **options)
+        if calls > FIRST:
+            return function(*arguments, **options)
+        if checked is None:  # not before: most functions are imported and never called
+            checked = beartype(function)
+        return checked(*arguments, **options)
 
     return some_checked

@@ -15,9 +15,9 @@ from estimator.channel.angle_range_map_2d import X_AXIS, Y_AXIS, polar_points
 from estimator.measurement.model import MeasurementError, Uplink
 
 SUBARRAY = (2, 3)
-"""Elements of each shifted part over all, as a fraction: the part keeps most of the aperture,
-and the shifts, forward and backward, restore the rank of two thirds as many paths as there are
-elements. Chosen, not measured. [-]"""
+"""Elements of each shifted part over all, as a fraction. Parts of P of M elements, shifted forward
+and backward, tell K < P paths, and restore a rank of K ≤ 2 (M − P + 1): both allow most at
+P = 2 (M + 1)/3 (Pillai and Kwon, IEEE Trans. ASSP 37, 1989). [-]"""
 LEAST_OUTSIDE = 1e-15
 """Least share of a steering vector in the noise space, about float64's rounding: the spectrum stays
 finite. [-]"""

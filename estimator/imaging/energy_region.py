@@ -48,7 +48,8 @@ processor. Of larger parts of the aperture random positions are taken: where a m
 points, nine parts and eight bands, 400 of each, whose random sidelobes are at 1/400, −26 dB. [-]"""
 TOLD = 0.5
 """Part of the unambiguous range within which everything lies, if the profiles tell ranges but for
-the number of periods. Chosen, not measured. [-]"""
+the number of periods: of a scene that fills less than half of a period, the longest empty part of
+it is longer than the scene, and tells where it begins. [-]"""
 SHARPER = 1.5
 """Intensity of a peak over that of nearer periods from which a farther one is taken: a point out of
 focus loses more, and where the curvature tells nothing both are equal. [-]"""

@@ -35,29 +35,32 @@ aperture reach −7.5 dB. [-]"""
 REGION = 0.1
 """Intensity over a target's peak that still belongs to it: −10 dB, inside of any main lobe. [-]"""
 WINDOW = 60
-"""Half the side of the neighbourhood of a peak in which its region is followed, for time. Chosen,
-not measured. [pixels]"""
+"""Half the side of the neighbourhood of a peak in which its region is followed, for time. With 30
+and 120 the targets of 30 scans are the same (``python -m validation.experiments.thresholds
+images``). [pixels]"""
 WIDE = 4.0
 """Extent from which a target may be more than a point, of which the tapered lobe spans 2.7 down to
 :data:`REGION`. [cells]"""
 BROADER = 3.0
 """How far below :data:`REGION` a point's own response may be at the ends of a region that a point
 alone explains: with few frequencies it is long in depth, and longer behind the point than before
-it. It is what a pixel at either end changes. Chosen, not measured. [-]"""
+it. It is what a pixel at either end changes; with 1.5 and 6 the targets of 30 scans are the same
+(``python -m validation.experiments.thresholds images``). [-]"""
 RESPONSE = 41
 """Points along a region at which a point's own response is computed. [-]"""
 SHADOW = 0.1
 """Intensity over a brighter target's of what is out of focus before or behind it, along the same
 ray: with few frequencies the image is long in range, and only its ends are told apart. [-]"""
 SHADOW_CELLS = 2.0
-"""Distance across the ray within which something is before or behind another: its main lobe, and
-half a cell by which either is off. Chosen, not measured. [cells]"""
+"""Distance across the ray within which something is before or behind another: its main lobe, which
+ends at 1.4, and half a cell by which either is off. With 1 and 4 the targets of 30 scans are the
+same (``python -m validation.experiments.thresholds images``). [cells]"""
 REPEATED_WITHIN = 2.0
-"""Distance from where a repetition would come from in which its origin is looked for: its main
-lobe, and half a cell by which either is off. Chosen, not measured. [cells]"""
+"""Distance from where a repetition would come from in which its origin is looked for: as
+:data:`SHADOW_CELLS`, and measured with it. [cells]"""
 MOST_TARGETS = 24
-"""Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
-"""
+"""Targets at which the search ends, for time: 30 scans show 38 targets in all, with half and twice
+as many the same (``python -m validation.experiments.thresholds images``). [-]"""
 ZOOM = 7
 """Points along each axis on which a maximum is focused anew, within a pixel of it. [-]"""
 ZOOMS = 4

@@ -57,7 +57,8 @@ POINT_WIDTH = 1.7
 """Extent of a point down to :data:`REGION`, over its half-power width: of any lobe that falls
 like a parabola in decibels, the square root of 10 dB over 3 dB is 1.8. [-]"""
 END_SHARE = 0.05
-"""Deviation of a short wall's end, over its length. Chosen, not measured. [-]"""
+"""Deviation of a short wall's end, over its length: an end is told to half a cell, and walls are
+longer than 8 cells (:data:`estimator.walls.wall_detection_2d.LEAST_CELLS`), as a rule 10. [-]"""
 DEVIATION = 0.39
 r"""Deviation of a peak's place over cell and amplitude ratio, :math:`\sqrt{6}/2\pi`: the
 Cramér–Rao bound for a flat spectrum and an unknown phase. [-]"""

@@ -1,8 +1,8 @@
 """Measurements of the estimator's thresholds on draws of noise, speckle, rough walls and rooms.
 
-Run as ``python -m validation.experiments.thresholds [chance|walls|scans|answers] [DRAWS]``.
+Run as ``python -m validation.experiments.thresholds [TABLE ...] [DRAWS]``.
 
-Not in the thesis, whose walls are marked by hand. Four tables:
+Not in the thesis, whose walls are marked by hand. Seven tables:
 
 - ``chance``: false-alarm rates and false detections by noise and random peaks
   (:mod:`validation.trials.chance_finds`);
@@ -12,34 +12,51 @@ Not in the thesis, whose walls are marked by hand. Four tables:
   is changed to neighbouring values. If neighbours give the same result, the constant needs no
   finer choice; if one loses walls or adds false ones, this justifies the constant;
 - ``answers``: the same for users, walls and targets of whole estimates in simulated rooms
-  (:mod:`validation.trials.room_answers`), with :data:`ROOM_SEEDS` realisations of each.
+  (:mod:`validation.trials.room_answers`), with :data:`ROOM_SEEDS` realisations of each;
+- ``decisions``: the same for constants that decide on users alone, each room mapped once;
+- ``images``: targets at scatterers and false ones in scans in closed form, of points, letters and
+  soil, with a linear and a planar array (:mod:`validation.trials.measured_scans`);
+- ``space``: as ``answers`` in rooms in space (the set ``space`` of random rooms, those for tuning).
 
 Claims that are asserted: each threshold does what its docstring states, within the limits in the
 table; and no scan's own value gives fewer right answers, or more false ones, than a neighbour.
 """
 
+import importlib
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
+from estimator.localization.pipeline import locate
 from estimator.walls import line_refinement, line_relations, wall_detection_2d
+from simulator.simulation import simulate
+from validation.experiments.measured_scans import false_targets as targets_away
 from validation.harness.claim import Row
 from validation.harness.row_table import conclude
+from validation.metrics.truth import truth_from_dataset
+from validation.random_rooms.prior import SEEDS, draw_room
 from validation.trials.chance_finds import chance_rows
+from validation.trials.constant_scans import (
+    ANSWER_SCANS,
+    DECISION_SCANS,
+    DECISIONS,
+    IMAGE_SCANS,
+    RIVAL_SCAN,
+    SPACE_SCANS,
+    Scan,
+)
 from validation.trials.drawn_echoes import Kind
+from validation.trials.measured_scans import KINDS, DrawnScan, drawn_scan
 from validation.trials.room_answers import (
-    BODIES,
     DIFFUSE,
     DIFFUSE_SEEDS,
-    PATHS,
-    WALLS_IN_WALLS,
     Answers,
     SimulatedRoom,
     answers,
     diffuse_answers,
+    each_mapped_once,
     rough_pilot,
     simulated_room,
 )
@@ -57,11 +74,15 @@ from validation.trials.wall_statistics import (
     wall_statistics,
 )
 
-TABLES = ("chance", "walls", "scans", "answers")
+TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space")
 DRAWS = 12
 """Walls of each family. [-]"""
 ROOM_SEEDS = 1
 """Realisations of each room: every one is located with all values of a constant. [-]"""
+SCAN_SEEDS = 3
+"""Scans of each kind and array: of seeds below 1000, which are for tuning. [-]"""
+SPACE_ROOMS = 2
+"""Rooms in space. [-]"""
 SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
 """Echoes on which constants are scanned, besides one simulated wall of each family. [-]"""
 
@@ -74,16 +95,6 @@ LARGER_SHARES = {
 }
 """The same of the families for which that docstring states larger ones: a known fault of lines that
 the echo does not place, which must not grow. [-]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Scan:
-    """A constant, the neighbouring values, and for whole answers the rooms."""
-
-    module: str
-    name: str
-    values: tuple[float, float]
-    rooms: tuple[str, ...] = ()  # keys of :data:`validation.trials.trap_rooms.TRAPS`
 
 
 SCANS = (
@@ -108,20 +119,6 @@ SCANS = (
     Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CELLS", values=(6.0, 12.0)),
     Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
 )
-
-ANSWER_SCANS = (
-    Scan(module="estimator.channel.path", name="LEAST_SHARE", values=(0.025, 0.1), rooms=PATHS),
-    Scan(module="estimator.channel.path", name="CURVATURE_SLACK", values=(0.05, 0.2), rooms=PATHS),
-    Scan(module="estimator.mapping.wall_unfolding", name="SAME_PLACE", values=(1.5, 6.0),
-         rooms=WALLS_IN_WALLS),
-    Scan(module="estimator.mapping.target_detection", name="WIDE", values=(1.0, 4.0),
-         rooms=BODIES),
-)  # fmt: skip
-"""Constants that decide on paths, walls and targets, with half and twice their value."""
-RIVAL_SCAN = Scan(
-    module="estimator.positioning.diffuse_positioning", name="RIVAL", values=(0.8, 0.95)
-)
-"""The same for positions by diffuse scattering, with twice and half its distance from 1."""
 
 
 def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
@@ -207,6 +204,29 @@ def overlap_rows(echoes: tuple[Surveyed, ...], *, draws: int = 400) -> list[Row]
     ]
 
 
+def space_room(number: int) -> SimulatedRoom:
+    """Simulate a room of the set ``space`` for tuning, with its truth."""
+    room = draw_room("space", number, purpose="tuning")
+    simulation = simulate(room, seed=SEEDS["tuning"], sample=number)
+    return SimulatedRoom(
+        measurement=simulation.measurement, truth=truth_from_dataset(simulation.truth)
+    )
+
+
+def scan_answers(scans: Sequence[DrawnScan]) -> Answers:
+    """Count the scans of which a target is at a scatterer as right, and false targets."""
+    right = targets = false = 0
+    for one in scans:
+        estimate = locate(one.measurement, images=False)
+        wrong = targets_away(one, estimate)
+        right += len(estimate.targets) > wrong
+        targets, false = targets + len(estimate.targets), false + wrong
+    return Answers(
+        right=right, wrong=0, median_error=np.nan, walls=0, false_walls=0, targets=targets,
+        false_targets=false,
+    )  # fmt: skip
+
+
 def scan(one: Scan, echoes: tuple[Surveyed, ...]) -> dict[float, Detection]:
     """Detect the walls of echoes with a constant's own value and with the neighbouring ones."""
     own = getattr(sys.modules[one.module], one.name)
@@ -243,14 +263,30 @@ def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
     )
 
 
-def answer_scan(one: Scan, answered: Callable[[], Answers]) -> dict[float, Answers]:
-    """Count answers with a constant's own value and with the neighbouring ones."""
-    own = getattr(sys.modules[one.module], one.name)
+def answer_scan(
+    one: Scan, answered: Callable[[], Answers], known: Answers | None = None
+) -> dict[float, Answers]:
+    """Count answers with a constant's own value, unless known, and with the neighbouring ones."""
+    own = getattr(importlib.import_module(one.module), one.name)
     results = {}
     for value in sorted({own, *one.values}):
-        with changed(one.module, one.name, value):
+        if known is not None and value == own:
+            results[value] = known
+            continue
+        with changed(one.module, one.name, type(own)(value)):
             results[value] = answered()
     return results
+
+
+def scanned_rows(scans: Sequence[Scan], answered: Callable[[], Answers]) -> list[Row]:
+    """Scan constants on the same rooms: their own values are tried once for all."""
+    known = answered()
+    rows = []
+    for one in scans:
+        told = answer_scan(one, answered, known)
+        print(answer_line(one, told), flush=True)
+        rows.append(answer_row(one, told))
+    return rows
 
 
 def answer_line(one: Scan, results: dict[float, Answers]) -> str:
@@ -319,6 +355,21 @@ def main(arguments: list[str]) -> None:
         told = answer_scan(RIVAL_SCAN, partial(diffuse_answers, pilots))
         print(answer_line(RIVAL_SCAN, told), flush=True)
         rows.append(answer_row(RIVAL_SCAN, told))
+    if "decisions" in wanted:
+        placed = [simulated_room(name, 0) for name in DECISIONS]
+        with each_mapped_once():
+            rows += scanned_rows(DECISION_SCANS, partial(answers, placed))
+    if "images" in wanted:
+        scanned = [
+            drawn_scan(kind, np.random.default_rng([seed, number, planar]), planar=bool(planar))
+            for seed in range(SCAN_SEEDS)
+            for number, kind in enumerate(KINDS)
+            for planar in (0, 1)
+        ]
+        rows += scanned_rows(IMAGE_SCANS, partial(scan_answers, scanned))
+    if "space" in wanted:
+        spaces = [space_room(number) for number in range(SPACE_ROOMS)]
+        rows += scanned_rows(SPACE_SCANS, partial(answers, spaces))
     conclude(rows)
 
 

@@ -5,8 +5,10 @@ has its own ones, in which their decisions occur. For the search by diffuse scat
 whole estimate seldom needs, it is run by itself, with the true wall.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +16,9 @@ from scipy.stats import chi2
 
 from estimator.geometry.wall_2d import Wall
 from estimator.localization.pipeline import locate
-from estimator.measurement.model import Measurement, Uplink
+from estimator.localization.stages import MappedRoom
+from estimator.localization.stages_2d import LinearStages
+from estimator.measurement.model import Echo, Measurement, Uplink
 from estimator.positioning.diffuse_positioning import search_diffuse
 from estimator.positioning.wall_anchors import SeenWall
 from scenes.files.loading import load_scenario
@@ -85,6 +89,22 @@ def simulated_room(name: str, seed: int) -> SimulatedRoom:
     return SimulatedRoom(
         measurement=simulation.measurement, truth=truth_from_dataset(simulation.truth)
     )
+
+
+@contextmanager
+def each_mapped_once() -> Iterator[None]:
+    """Keep the map of each linear array's echo, for constants that do not change it."""
+    mapped = LinearStages.map_room
+    maps: dict[bytes, MappedRoom] = {}
+
+    def once(stages: LinearStages, echo: Echo) -> MappedRoom:
+        key = echo.samples.tobytes()
+        if key not in maps:
+            maps[key] = mapped(stages, echo)
+        return maps[key]
+
+    with patch.object(LinearStages, "map_room", once):
+        yield
 
 
 def answers(rooms: Sequence[SimulatedRoom]) -> Answers:

@@ -31,7 +31,7 @@ SLANTED = wall((-0.2, 0.6), (0.2, 1.0))  # through (0, 0.8) at 45°, as in the t
 MIRROR = wall((-1.0, 0.8), (1.0, 0.8))
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(*[COORDINATE] * 6)
 def test_the_image_of_an_image_is_the_point_itself(
     x: float, y: float, x0: float, y0: float, x1: float, y1: float
@@ -53,7 +53,7 @@ def test_many_points_are_mirrored_at_once() -> None:
     np.testing.assert_allclose(images, [[[0, 1, 0], [2, 0, 1]]], atol=1e-15)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(angle_deg=st.floats(-85, 85), aoa_deg=st.floats(40, 140), behind=st.floats(0.05, 2.0))
 def test_folding_is_the_thesis_rotation_about_the_point_where_the_ray_meets_the_wall(
     angle_deg: float, aoa_deg: float, behind: float
@@ -122,7 +122,7 @@ def test_the_nearer_of_two_walls_reflects_whatever_their_order() -> None:
         np.testing.assert_allclose(found.position, [0, 0.6, 0], atol=1e-12)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(
     first_deg=st.floats(30, 60),
     second_deg=st.floats(-60, -30),

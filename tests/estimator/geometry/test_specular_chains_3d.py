@@ -49,7 +49,7 @@ def random_walls(rng: np.random.Generator) -> list[PlaneWall]:
 def test_lines_are_unfolded_as_rays_that_are_followed_one_by_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     walls = random_walls(rng)
-    points = rng.uniform([-2.0, 0.3, -1.0], [2.0, 6.0, 1.0], (300, 3))
+    points = rng.uniform([-2.0, 0.3, -1.0], [2.0, 6.0, 1.0], (150, 3))
     places, chains = unfolded(points, walls, deepest=8)
     lengths = []
     for point, place, chain in zip(points, places, chains, strict=True):

@@ -21,14 +21,14 @@ def room(*, gain_dbi: float = 20.0, objects: dict[str, Any] | None = None) -> Sc
     wall = {
         "kind": "plate", "material": "metal", "centre_m": [0.0, 0.7, 0.0], "angle_deg": 20.0,
         "length_m": 1.0, "height_m": 1.0,
-        "roughness": {"rms_mm": 0.2, "correlation_mm": 8.0},
+        "roughness": {"rms_mm": 0.4, "correlation_mm": 16.0},
     }  # fmt: skip
     return parse_scenario(
         {
             "name": "room", "dimensions": 3, "max_bounces": 1,
-            "radio": {"start_ghz": 28.0, "stop_ghz": 32.0, "points": 21},
+            "radio": {"start_ghz": 14.0, "stop_ghz": 16.0, "points": 11},
             "base_station": {
-                "elements": [4, 3], "spacing_mm": 8.0,
+                "elements": [4, 3], "spacing_mm": 16.0,
                 "antenna": {"kind": "horn", "gain_dbi": gain_dbi},
             },
             "objects": {"wall": wall} | (objects or {}),

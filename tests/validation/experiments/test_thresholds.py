@@ -8,10 +8,7 @@ import pytest
 
 from estimator.walls import line_relations
 from validation.experiments.thresholds import (
-    ANSWER_SCANS,
-    RIVAL_SCAN,
     SCANS,
-    Scan,
     answer_row,
     overlap_rows,
     scan,
@@ -19,6 +16,14 @@ from validation.experiments.thresholds import (
     wall_rows,
 )
 from validation.trials import chance_finds
+from validation.trials.constant_scans import (
+    ANSWER_SCANS,
+    DECISION_SCANS,
+    IMAGE_SCANS,
+    RIVAL_SCAN,
+    SPACE_SCANS,
+    Scan,
+)
 from validation.trials.drawn_echoes import draw_echo
 from validation.trials.room_answers import answers, diffuse_answers, rough_pilot, simulated_room
 from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
@@ -76,7 +81,11 @@ def test_a_constant_is_changed_wherever_it_is_imported() -> None:
     assert vars(user)["BEYOND_END"] == own
 
 
-@pytest.mark.parametrize("one", [*SCANS, *ANSWER_SCANS, RIVAL_SCAN], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "one",
+    [*SCANS, *ANSWER_SCANS, *DECISION_SCANS, *IMAGE_SCANS, *SPACE_SCANS, RIVAL_SCAN],
+    ids=lambda one: f"{one.module.rpartition('.')[2]}.{one.name}",
+)
 def test_each_scan_is_of_a_constant_that_exists_between_the_values_tried(one: Scan) -> None:
     low, high = one.values
     module = importlib.import_module(one.module)
