@@ -20,8 +20,8 @@ from estimator.measurement.constant_signal import PROPOSED_DB
 from estimator.measurement.model import Echo
 
 FEWEST = 8
-"""Positions of which a mean tells anything: of fewer, independent echoes share one part in eight and
-more by chance. With 4 and 16 the targets of 30 scans are the same (``python -m
+"""Positions of which a mean tells anything: independent echoes of fewer share an eighth of their
+energy and more by chance. With 4 and 16 the targets of 30 scans are the same (``python -m
 validation.experiments.thresholds images``). [-]"""
 ONE_DELAY = 0.95
 """Share of the constant's energy that one delay explains, from which it may be a plate: mismatch
