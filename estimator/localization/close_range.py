@@ -56,8 +56,13 @@ def close_scene(echo: Echo, *, nearest: float, planar: bool) -> str | None:
     strongest = 0.5 * profiles.cell * int(np.argmax(power))
     if strongest > nearest:
         return None
-    if strongest < cell and nearest < cell:  # all of it is one range cell: nothing tells
-        return None
+    if strongest < cell and nearest < cell:  # all of it is one range cell
+        if not planar:  # nothing tells
+            return None
+        return (
+            f"the strongest echo is within the first range cell of {cell:.3g} m, where delays tell "
+            "no wall from a thing nearby: only the aperture tells depths"
+        )
     return (
         f"the strongest echo comes from {strongest:.3g} m, nearer than {nearest:.3g} m, from where "
         "on a room is surveyed"

@@ -22,6 +22,7 @@ from estimator.measurement.constant_signal import (
 )
 from estimator.measurement.model import Echo, Measurement, MeasurementError, PathList, Uplink
 from mmslam.formats.array_reader import FILES, ArrayReader
+from mmslam.formats.checks.autofocused import autofocused
 from mmslam.formats.checks.boresight import boresight_of
 from mmslam.formats.checks.focus_check import delay_by_focus, focus_notes
 from mmslam.formats.mapping import SweepMapping
@@ -104,6 +105,10 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             )
         boresight, remark = boresight_of(str(source), raw.positions, given)
         echo = _calibrated(reader, raw, mapping.echo, "echo", boresight)
+        if mapping.echo.autofocus:
+            with told(f"{source}: echo.autofocus"):
+                echo, refocused = autofocused(echo, boresight)
+            notes.append(f"{source}: echo: {refocused}")
         notes += focus_notes(f"{source}: echo", echo, boresight, clock_known=True)
         notes += _notes(source, "echo", echo, found, stepped=stepped)
         echo = _in_medium(echo, mapping.refractive_index)

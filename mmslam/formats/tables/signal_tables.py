@@ -168,6 +168,11 @@ class SignalTable(SamplesTable):
 class EchoTable(SignalTable):
     """The echo; its transmitter may stand apart."""
 
+    autofocus: Literal["range"] | None = Field(
+        default=None,
+        description='"range": how far each position is towards the scene is corrected by the '
+        "sharpest image",
+    )
     transmit_offset_m: Vector | None = Field(
         default=None, description="from each receive position to its transmitter [m]"
     )

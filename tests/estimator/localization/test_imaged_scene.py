@@ -10,6 +10,7 @@ from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.results.estimate import Estimate
 from validation.analytic.point_scatterer import complex_noise, point_echo
+from validation.trials.measured_scans import drawn_scan
 
 BAND = np.linspace(20e9, 26e9, 31)  # 0.75 m unambiguous, cells of 25 mm
 AHEAD = np.array([0.0, 1.0, 0.0])
@@ -154,3 +155,11 @@ def test_a_point_that_few_frequencies_show_long_in_depth_is_placed_at_its_focus(
     assert len(found) == 2
     assert np.abs(found[np.argsort(-found[:, 0])] - places).max() < 1.5e-3
     assert all(target.ends is None for target in estimate.targets)
+
+
+def test_what_is_within_the_first_range_cell_of_a_plane_is_no_mirror() -> None:
+    """A flat letter 2 cm before a plane of 3 cm; delays tell ranges to 6 cm only."""
+    drawn = drawn_scan("letter", np.random.default_rng([2005, 1, 1]), planar=True)
+    found = locate(drawn.measurement, images=False)
+    assert not found.mirrors
+    assert any("first range cell" in note for note in found.notes)

@@ -1,13 +1,17 @@
 """What a bench adds to a point's echo is proposed to be taken out, and is taken out by its key."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.constants import speed_of_light
 
+from estimator.imaging.autofocus import contributions
 from estimator.measurement.model import Echo, MeasurementError
 from mmslam.formats.import_measured import Import
+from validation.metrics.image_quality import image_entropy
 
 FREQUENCIES = np.linspace(30e9, 34e9, 21)  # [Hz]
 FREQUENCY = 'frequency = { start = 30.0, stop = 34.0, points = 21, unit = "GHz" }\n'
@@ -104,3 +108,41 @@ def test_a_delay_that_no_focus_tells_is_refused_with_the_remedy(
     np.savez(tmp_path / "s.npz", s=flat, p=WIDE)
     with pytest.raises(MeasurementError, match=r"needs a wave whose curvature is known"):
         take(tmp_path, "s.npz", DELAYED + 'cable_delay_ns = "focus"\n')
+
+
+def rail(folder: Path, *, jitter: float) -> np.ndarray:
+    """Write a sweep of two points from a rail; return the true positions. [m]."""
+    x = (np.arange(60) - 29.5) * 0.45e-3
+    true = np.stack([x, jitter * np.random.default_rng(2).normal(size=60), 0 * x], axis=-1)
+    f = np.linspace(285e9, 315e9, 31)
+    delays = [
+        2 * np.linalg.norm(true - target, axis=1)[:, None] / speed_of_light
+        for target in ([0.004, 0.16, 0.0], [-0.006, 0.15, 0.0])
+    ]
+    s = 1e-3 * sum(np.exp(-2j * np.pi * f * delay) for delay in delays)
+    np.savez(folder / "rail.npz", s=s, f=f, x=x)
+    return true
+
+
+RAIL = """
+frequency = { variable = "f", unit = "Hz" }
+positions = { x = "x", unit = "m" }
+echo = { variable = "s", autofocus = "range" }
+"""
+
+
+def test_a_rails_jitter_is_taken_out_at_import(
+    tmp_path: Path, take: Callable[[Path, str, str], Import]
+) -> None:
+    true = rail(tmp_path, jitter=1e-4)
+    found = take(tmp_path, "rail.npz", RAIL)
+    assert found.measurement.echo is not None
+    assert any("positions were moved towards the scene" in note for note in found.notes)
+    echo = found.measurement.echo
+    x, y = np.meshgrid(np.arange(-0.02, 0.02, 1e-3), np.arange(0.13, 0.19, 2e-3))
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=-1)
+    sharp, real = (
+        image_entropy(contributions(one, points).sum(axis=0))
+        for one in (echo, replace(echo, positions=true))
+    )
+    assert sharp < 1.02 * real
