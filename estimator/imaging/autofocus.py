@@ -4,7 +4,7 @@ A position that errs by δ towards the scene turns all its echoes by :math:`4 \p
 turns that make the image sharpest, :math:`\sum_p |I_p|^4` of its brightest pixels, are found by
 the ascent
 
-.. math:: \phi_m \leftarrow -\arg \sum_p |I_p|^2 I_p^* b_{mp} ,
+.. math:: \phi_m = -\arg \sum_p |I_p|^2 I_p^* b_{mp} ,
 
 which never lowers it, with what position m alone gives at each pixel, :math:`b_{mp}`: the sharpness
 is convex in the turned contributions, and this maximises its tangent [1]_. A turn is taken as a
