@@ -29,7 +29,8 @@ from estimator.geometry.specular_chains import Chain, image_over, unfolded_over
 ROUNDS = 2
 """How often the walls' part of the covariance is taken at the place found. [-]."""
 ITERATIONS = 20
-"""Most Gauss-Newton steps; near the place a handful converges. Chosen, not measured. [-]"""
+"""Most Gauss-Newton steps. :data:`CONVERGED` ends what converges, near the place after a handful;
+what does not leaves a χ² that the test of agreement refuses. [-]"""
 CONVERGED = 1e-12
 """Step that ends an iteration: far below a wavelength, above float64's rounding of metres. [m]"""
 AGREE = 1 - false_alarm.DISAGREEMENT

@@ -37,7 +37,8 @@ GRID = np.linspace(-1.0, 1.0, 9)
 DEPTHS = 9
 """Samples of a parabola; the first search has three times as many. [-]"""
 CELLS_CUT = 1.5
-"""Cells left out around the rim, whose sidelobes lean. Chosen, not measured. [cells]"""
+"""Cells left out around the rim, whose sidelobes lean: the main lobe of sin x/x ends at 1, and its
+first sidelobe, −13 dB, peaks at 1.43. [cells]"""
 MOST_CUT = 0.2
 """Most that is left out of a small wall at each side, over its least extent: a third of its area is
 left at least. [-]"""
@@ -78,11 +79,13 @@ FARTHEST = 2.5
 """Distance to which a plane is followed, over that of its farthest known corner, for time. Chosen,
 not measured. [-]"""
 MOST_STEPS = 150
-"""Steps of the grid on which it is followed, on either side: 90 000 places, for time. Chosen, not
-measured. [-]"""
+"""Steps of the grid on which it is followed, on either side, for time: 90 000 places. They are half
+a cell (:data:`SPACING`) for arrays of up to some 23 λ: :data:`FARTHEST` times its distance are
+5 D/λ cells λR/2D, which the survey's taper widens 1.54 times. Of larger arrays they are longer.
+[-]"""
 MOST_CORNERS = 8
-"""Corners of the polygon that is reported: a rectangle cut at each corner has as
-many. Chosen, not measured. [-]"""
+"""Corners of the polygon that is reported: where a rectangular wall and the imaged sector, two
+convex quadrilaterals, overlap, they share one of at most eight corners. [-]"""
 FEWEST_CELLS = 12.0
 """Smallest area of a wall: independent cells in which background alone passes :data:`CONTRAST`
 together with a probability of e⁻⁴⁸. [cells²]"""

@@ -16,8 +16,8 @@ from estimator.imaging.survey_2d import Survey
 from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
 
 SAMPLES = 32
-"""Places between two peaks at which the image is read: a cell or less apart on most ridges. Chosen,
-not measured. [-]"""
+"""Places between two peaks at which the image is read: a cell or less apart on ridges of up to 31
+cells; longer walls have, as a rule, the peaks that a consensus needs. [-]"""
 LEAST_CELLS = 4.0
 """Shortest ridge: 1.54 times as many cells of the untapered echo. [cells]"""
 LIT_SHARE = 0.7

@@ -39,8 +39,8 @@ from estimator.wavefronts.wave_fit_3d import Wavefront, fit_wavefront
 LEAST_CONFIDENCE = 1 - false_alarm.WALL
 """Confidence of a wall that is reported. [-]"""
 FLASHES = 6
-"""Brightest peaks, beams apart, that are looked at for a flat wave: as many as a box has
-walls; chosen, not measured. [-]"""
+"""Brightest peaks, beams apart, that are looked at for a flat wave: each wall returns one, from the
+foot of its perpendicular, and a box has six. [-]"""
 FLAT = 0.25
 """Curvature, over that of a point at the distance, up to which a wave counts as flat. A disc of
 one Fresnel zone, √(λR/2) in radius, has half of it; a wall that is larger has none. [-]"""
@@ -52,7 +52,7 @@ STANDS_OUT = 0.25
 makes flat waves of the speckle of a rough wall, but faint ones. [-]"""
 SKIRT = 2.5
 """Distance from a wall within which a peak belongs to it: the main lobe, which ends at 1.4, and a
-cell that the wall is off. Chosen, not measured. [cells]"""
+cell that the wall may be off before it is refined. [cells]"""
 DEVIATIONS = 6.0
 """Deviations by which the curvature may miss 0, or must miss a point's. The covariance is estimated
 from 25 tiles of the array, of which a few may hold most of the speckle. [-]"""
