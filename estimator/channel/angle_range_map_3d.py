@@ -73,6 +73,8 @@ def direction_map(
     )
     values = np.zeros((along.size, up.size, lengths.size), dtype=np.complex128)
     if busy.any():
+        # Two cosines beyond the hemisphere are no direction: their places would be out of reach.
+        rays[ahead <= 0] = [0.0, 1.0, 0.0]
         points = lengths[busy][None, None, :, None] * rays[:, :, None, :]
         values[:, :, busy] = focus_uplink(uplink, points)
         values[ahead <= 0] = 0.0

@@ -29,7 +29,8 @@ from estimator.results.estimate import UserEstimate
 
 RIVAL = 0.25
 """Share of energy, over the answer's, from which a contradicting path makes it ambiguous: half the
-amplitude. Chosen, not measured. [-]"""
+amplitude. With half and twice of it the answers in ten rooms, one of them on an unknown clock, are
+the same (``python -m validation.experiments.thresholds decisions``). [-]"""
 SHARP = 10.0
 """A position known this many times better than the distance of its alternative cannot have
 been hit by chance: two paths agree there. [-]"""
