@@ -23,11 +23,12 @@ from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall, unassigned_peaks
 
 TARGET_LEVEL = 1e-3
-"""Intensity, over that of the brightest target, of what still is one: −30 dB. Chosen, not measured.
-[-]"""
+"""Intensity, over that of the brightest target, of what still is one: −30 dB. With half and twice
+of it the answers in two rooms in space are the same but for one of three false targets, gone at
+−27 dB (``python -m validation.experiments.thresholds space``). [-]"""
 MOST_TARGETS = 24
-"""Targets at which the search ends, for time: far above what scenes hold; chosen, not measured. [-]
-"""
+"""Targets at which the search ends, for time: two rooms in space show three, with half and twice as
+many the same (``python -m validation.experiments.thresholds space``). [-]"""
 STANDS_OUT = 25.0
 """Intensity over the background's that a target must reach: of pure background one voxel in 1e10
 does. [-]"""

@@ -76,8 +76,9 @@ a wall must hang together over many. [-]"""
 SMOOTHED = 3
 """Half-cell pixels along either axis that are averaged before :data:`CONTRAST`. [-]"""
 FARTHEST = 2.5
-"""Distance to which a plane is followed, over that of its farthest known corner, for time. Chosen,
-not measured. [-]"""
+"""Distance to which a plane is followed, over that of its farthest known corner, for time. With
+half and twice of it the answers in two rooms in space are the same (``python -m
+validation.experiments.thresholds space``). [-]"""
 MOST_STEPS = 150
 """Steps of the grid on which it is followed, on either side, for time: 90 000 places. They are half
 a cell (:data:`SPACING`) for arrays of up to some 23 λ: :data:`FARTHEST` times its distance are

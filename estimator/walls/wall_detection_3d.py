@@ -46,7 +46,8 @@ FLAT = 0.25
 one Fresnel zone, √(λR/2) in radius, has half of it; a wall that is larger has none. [-]"""
 MOST_VOXELS = 200
 """Brightest voxels of a cluster that are traced to where they may be the grating lobe of: for
-time; chosen, not measured. [-]"""
+time. With half and twice as many the answers in two rooms in space are the same (``python -m
+validation.experiments.thresholds space``). [-]"""
 STANDS_OUT = 0.25
 """Share of the energy that arrives around its distance that a flat wave must explain: chance
 makes flat waves of the speckle of a rough wall, but faint ones. [-]"""
@@ -61,7 +62,8 @@ BEAMS_APART = 3.0
 wide as the array, which near it is a few beams. [cells λ/2D]"""
 GATE_CELLS = 4.0
 """Range beyond the array's extent that is kept for the fit of a flat wave: its main lobe, and what
-the peak is off. Chosen, not measured. [cells c/2B]"""
+the peak is off. With 2 and 8 the answers in two rooms in space are the same (``python -m
+validation.experiments.thresholds space``). [cells c/2B]"""
 ROUNDEST = 1.5
 """Largest curvature tried, over that of a point at the distance: what is rounder is no wall. [-]"""
 SAME_DIRECTION = 0.1
