@@ -78,8 +78,13 @@ class ListedPaths:
         )
 
     def log_spread(self, offset: float) -> Float[np.ndarray, " paths"]:
-        """Return the logarithm of an image's area for each solid angle and length of the path."""
-        return np.asarray((self.axes - 1) * np.log(self.length + offset))
+        """Return the logarithm of an image's area for each solid angle and length of the path.
+
+        A path that would have no length, on a wrong clock, comes from nowhere: −∞.
+        """
+        length = self.length + offset
+        spread = (self.axes - 1) * np.log(np.maximum(length, 1e-9))
+        return np.where(length > 0, spread, -np.inf)
 
 
 def listed(lists: Sequence[PathList]) -> ListedPaths:
