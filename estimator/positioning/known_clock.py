@@ -100,7 +100,7 @@ def _decided(
         else:
             way = look_along(alone, wave, room, found.how)
         ways[number] = way
-        odds[-1] = unseen_odds(one, found, room, way.sight) + through.get(number, 0.0)
+        odds[-1] = unseen_odds(one, found, room, way.sight, way.blocked) + through.get(number, 0.0)
     weights = np.exp(np.array(logs) - max(logs))
     total = float((weights * (1 + np.array(odds))).sum())
     places = _places(consistent, weights / total, found.how)

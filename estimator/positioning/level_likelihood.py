@@ -89,7 +89,9 @@ def told_excess_db(excess: float) -> float | None:
     return excess if LEAST_DB < excess < TOLD_TO_DB else None
 
 
-def level_density(excess: float, reflections: int, *, first: bool = True) -> float:
+def level_density(
+    excess: float, reflections: int, *, first: bool = True, blocked: float = BLOCKED
+) -> float:
     """Return the density of an excess after so many reflections. [1/dB].
 
     Parameters
@@ -100,8 +102,10 @@ def level_density(excess: float, reflections: int, *, first: bool = True) -> flo
         On the way.
     first
         Whether no path arrives before it.
+    blocked
+        Probability that something blocks the straight way to the user. [-]
     """
-    seen = BLOCKED if first and reflections else 1.0
+    seen = blocked if first and reflections else 1.0
     deviation = sqrt(LEVEL_DEVIATION_DB**2 + reflections * ASSUMED_DEVIATION_DB**2)
     away = (excess - reflections * ASSUMED_DB) / deviation
     normal = exp(-0.5 * away**2) / (sqrt(2 * pi) * deviation)

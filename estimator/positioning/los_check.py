@@ -18,8 +18,9 @@ from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.geometry.specular_chains import Chain
 from estimator.geometry.wall_2d import Wall
+from estimator.positioning.level_likelihood import BLOCKED
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.posterior import Sight
+from estimator.positioning.posterior import WITH_A_MIRROR, Sight
 from estimator.positioning.unseen_mirrors import wall_behind, wall_between
 from estimator.results.estimate import UserEstimate
 
@@ -41,6 +42,11 @@ CLOUD = 6.0
 """Distance from a known wall up to which a loose point passes for a part of the wall's echo:
 sidelobes and what was scattered twice. With 3 and 12 the answers in ten rooms are the same
 (``python -m validation.experiments.thresholds decisions``). [cells c/2B]"""
+BLOCKED_BY_UNKNOWN = 0.05
+"""Probability that something that is not in the map blocks the straight way to a user whom a mirror
+shows, before a look at the image: a quarter of
+:data:`estimator.positioning.level_likelihood.BLOCKED`, since most of what blocks are walls that are
+found. [-]"""
 UNSEEN_BEYOND = (
     "beyond the wall the path passes between two points that may be the ends of another wall, too "
     "smooth to be seen"
@@ -63,6 +69,7 @@ class StraightWay:
     sight: Sight
     doubt: str | None  # why something may be on it, for a person to read; None if it is clear
     otherwise: UserEstimate | None = None  # where the user is over a mirror between two points
+    blocked: float = BLOCKED  # probability that something blocks the straight way to there [-]
 
 
 def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing) -> StraightWay:
@@ -89,23 +96,17 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
         if aside is not None:
             peaks, shown, sight = [aside, *peaks], True, "clear aside"
     loose = np.concatenate([some[:LOOSE_PEAKS] for some in peaks])
-    mirror = unseen_mirror(heading, length, loose, room.resolution, how)
-    if mirror is not None:
-        place = project(how, wave.bearing, length, [mirror], covariance=wave.covariance)
-        other = replace(
-            answer,
-            status="ambiguous",
-            position=place.position,
-            covariance=place.covariance,
-            bounces=1,
-            path=place.path,
-            line_of_sight=False,
-        )
+    mirrors = unseen_mirrors(heading, length, loose, room.resolution, how)
+    others = [_over_one_more(answer, wave, (), mirror, room, how) for mirror in mirrors]
+    if others:
+        chances = [chance_of_blockage(other, room, how) for other in others]
+        other, blocked = max(zip(others, chances, strict=True), key=lambda one: one[1])
         return StraightWay(
             sight="between ends",
             doubt="the straight way passes between two points that may be the ends of a wall too "
             "smooth to be seen; over such a wall the user is elsewhere",
             otherwise=other,
+            blocked=blocked,
         )
     thing = what_stands_in_the_way(
         heading, length, np.concatenate(peaks), room.resolution.across_ray
@@ -244,14 +245,14 @@ def too_noisy(contrast: float) -> str:
     )
 
 
-def unseen_mirror(
+def unseen_mirrors(
     heading: Float[np.ndarray, " 3"],
     path_length: float,
     unassigned_peaks: Float[np.ndarray, "peaks 3"],
     resolution: Resolution,
     how: Bearing,
-) -> FlatWall | None:
-    """Return a wall between two peaks on no wall that the ray meets before its end, if any.
+) -> list[FlatWall]:
+    """Return the walls between two peaks on no wall that the ray meets before its end.
 
     Parameters
     ----------
@@ -264,13 +265,45 @@ def unseen_mirror(
     how
         What the array measures of a direction.
     """
-    points = unassigned_peaks
+    points, met = unassigned_peaks, []
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         wall = wall_between(points[first], points[second], resolution, how)
         hit = None if wall is None else wall.hit(np.zeros(3), heading)
-        if hit is not None and hit[0] < path_length:
-            return wall
-    return None
+        if wall is not None and hit is not None and hit[0] < path_length:
+            met.append(wall)
+    return met
+
+
+def chance_of_blockage(other: UserEstimate, room: MapContext, how: Bearing) -> float:
+    """Return the probability that something blocks the straight way to a user. [-].
+
+    The user is seen over a mirror, so the straight way, which is shorter, must be blocked or the
+    user's beam aimed elsewhere. The image shows what there is on that way as well.
+
+    Parameters
+    ----------
+    other
+        Where the user is over the mirror.
+    room, how
+        As in :func:`look_along`.
+    """
+    assert other.position is not None
+    far = float(np.linalg.norm(other.position))
+    heading = other.position / far
+    for wall in room.walls:
+        hit = wall.hit(np.zeros(3), heading)
+        if hit is not None and hit[0] < far - USER_SIZE:
+            return 1.0
+    if not room.shows(heading) or far > room.reach or hides_walls(room.contrast):
+        return BLOCKED
+    loose = room.unassigned_peaks
+    sight: Sight = "clear"
+    if what_stands_in_the_way(heading, far, loose, room.resolution.across_ray) is not None:
+        sight = "something on it"
+    elif unseen_mirrors(heading, far, loose[:LOOSE_PEAKS], room.resolution, how):
+        sight = "between ends"
+    odds = BLOCKED_BY_UNKNOWN / (1 - BLOCKED_BY_UNKNOWN) * WITH_A_MIRROR[sight]
+    return odds / (1 + odds)
 
 
 def what_stands_in_the_way(

@@ -27,6 +27,7 @@ from estimator.channel.path import Path, PathSet
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.specular_chains import Chain
 from estimator.positioning.level_likelihood import (
+    BLOCKED,
     level_density,
     path_excess_db,
     told_excess_db,
@@ -205,7 +206,13 @@ def beside(one: Path, other: Path, room: MapContext) -> bool:
     return bool(np.all(apart < near) and late < 2 * BESIDE_CELL * room.resolution.along_ray)
 
 
-def unseen_odds(explanation: Consensus, found: PathSet, room: MapContext, sight: Sight) -> float:
+def unseen_odds(
+    explanation: Consensus,
+    found: PathSet,
+    room: MapContext,
+    sight: Sight,
+    blocked: float = BLOCKED,
+) -> float:
     """Return the odds that a lone path came over one more mirror than it is said to. [-].
 
     Parameters
@@ -217,6 +224,9 @@ def unseen_odds(explanation: Consensus, found: PathSet, room: MapContext, sight:
     sight
         What the image shows of the way on which that mirror would be: the straight way of a direct
         path, the legs beyond the first mirror of one that was reflected.
+    blocked
+        Probability that something blocks the straight way to where the user is over that mirror;
+        used for direct paths. [-]
     """
     (only,) = explanation.sightings
     path = found.paths[only.path]
@@ -231,7 +241,8 @@ def unseen_odds(explanation: Consensus, found: PathSet, room: MapContext, sight:
     if excess is not None:
         bounces = len(only.chain)
         first = arrives_first(path, found, room)
-        odds *= level_density(excess, bounces + 1, first=first)
+        hidden = BLOCKED if bounces else blocked
+        odds *= level_density(excess, bounces + 1, first=first, blocked=hidden)
         odds /= level_density(excess, bounces, first=first)
     return odds * more
 
