@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.constants import speed_of_light
 
+from estimator.channel.lit_elements import part_of
 from estimator.channel.path import Path, PathSet
 from estimator.geometry.bearing import Bearing
 from estimator.measurement.model import Uplink
@@ -50,10 +51,11 @@ def _tilt(uplink: Uplink, path: Path, how: Bearing) -> float | None:
     """Return the change of a path's level over the band, over that of free space. [dB]."""
     source = path.radius * how.towards(path.free.bearing)
     centre = uplink.positions.mean(axis=0)
-    lengths = np.linalg.norm(uplink.positions - source, axis=-1)
+    reached = part_of(uplink, None if path.shadow is None else path.shadow.lit)
+    lengths = np.linalg.norm(reached.positions - source, axis=-1)
     lengths = lengths - float(np.linalg.norm(centre - source)) + path.free.path_length
     turns = np.exp(2j * np.pi / speed_of_light * lengths[:, None] * uplink.frequencies)
-    steered = np.mean(uplink.samples * turns, axis=0)
+    steered = np.mean(reached.samples * turns, axis=0)
     count = uplink.frequencies.size
     delays = np.fft.fftfreq(count) * count
     gate = np.exp(-((delays / GATE) ** STEEP))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.bearing_2d import LINEAR
@@ -67,6 +67,15 @@ class Wave(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Shadow:
+    """What an edge before the source takes of a wave."""
+
+    lit: Bool[np.ndarray, " elements"]  # the elements that it reaches
+    reached: Float[np.ndarray, " 3"]  # their centre [m]
+    dark: Float[np.ndarray, " 3"]  # centre of the others [m]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Path:
     """One wave of the pilot, in the array's frame."""
 
@@ -76,6 +85,7 @@ class Path:
     unambiguous: float  # longest path that the frequency step tells apart [m]
     tilt_db: float | None = None
     """Change of its level over the band, over that of free space; None if unknown. [dB]"""
+    shadow: Shadow | None = None  # None: it reaches all elements
 
     @property
     def specular(self) -> bool:

@@ -10,11 +10,13 @@ from scipy.constants import speed_of_light
 from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.channel.level_tilt import with_level_tilts
+from estimator.channel.lit_elements import lit_elements, part_of
 from estimator.channel.path import (
     LEAST_SHARE,
     MOST_PATHS,
     Path,
     PathSet,
+    Shadow,
     no_paths,
 )
 from estimator.geometry.bearing_2d import LINEAR
@@ -101,6 +103,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             free=wave,
             share=wave.explained * share,
             unambiguous=speed_of_light / step,
+            shadow=_shadow(uplink, wave),
         )
         for wave in free
     )
@@ -125,6 +128,16 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
     return with_level_tilts(uplink, found_paths)
 
 
+def _shadow(uplink: Uplink, wave: SphericalWave) -> Shadow | None:
+    if wave.lit is None:
+        return None
+    return Shadow(
+        lit=wave.lit,
+        reached=uplink.positions[wave.lit].mean(axis=0),
+        dark=uplink.positions[~wave.lit].mean(axis=0),
+    )
+
+
 def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
     """Tell whether two waves are within :data:`UNRESOLVED` cells, in angle and in length."""
     beam = speed_of_light / float(uplink.frequencies.mean()) / float(np.ptp(uplink.positions[:, 0]))
@@ -135,14 +148,29 @@ def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
 
 
 def _refined(uplink: Uplink, aoa: float, path_length: float) -> WaveStart:
-    wave = fit_spherical_wave(uplink, aoa=aoa, path_length=path_length)
-    start = search_curvature(uplink, aoa=wave.aoa, path_length=wave.path_length)
-    return WaveStart(aoa=start.aoa, path_length=start.path_length, radius=start.radius)
+    """Refine a peak of the map on the elements that its wave reaches, from their own centre."""
+    lit = lit_elements(uplink, aoa=aoa, path_length=path_length)
+    part = part_of(uplink, lit)
+    centre = np.zeros(3) if lit is None else part.positions.mean(axis=0)
+    source = path_length * LINEAR.towards(np.array([aoa])) - centre
+    local = replace(part, positions=part.positions - centre)
+    near = float(np.linalg.norm(source))
+    wave = fit_spherical_wave(local, aoa=float(np.arccos(source[0] / near)), path_length=near)
+    start = search_curvature(local, aoa=wave.aoa, path_length=wave.path_length)
+    seen = centre + start.radius * LINEAR.towards(np.array([start.aoa]))
+    radius = float(np.linalg.norm(seen))
+    return WaveStart(
+        aoa=float(np.arccos(seen[0] / radius)),
+        path_length=start.path_length - start.radius + radius,
+        radius=radius,
+        lit=lit,
+    )
 
 
 def _starts(waves: Sequence[SphericalWave]) -> list[WaveStart]:
     return [
-        WaveStart(aoa=wave.aoa, path_length=wave.path_length, radius=wave.radius) for wave in waves
+        WaveStart(aoa=wave.aoa, path_length=wave.path_length, radius=wave.radius, lit=wave.lit)
+        for wave in waves
     ]
 
 
@@ -155,6 +183,7 @@ def _bound(
             aoa=wave.aoa,
             path_length=wave.path_length,
             radius=None if path.specular else wave.radius,
+            lit=wave.lit,
         )
         for path, wave in zip(paths, free, strict=True)
     ]

@@ -77,9 +77,10 @@ def trace(
     path_length: float,
     walls: Sequence[FlatWall],
     *,
+    start: Float[np.ndarray, " 3"] | None = None,
     max_bounces: int = LONGEST_CHAIN,
 ) -> tuple[Float[np.ndarray, "vertices 3"], Chain, float]:
-    """Follow a ray from the origin over all walls that it meets.
+    """Follow a ray over all walls that it meets.
 
     Parameters
     ----------
@@ -87,12 +88,15 @@ def trace(
         Unit vector.
     path_length, walls, max_bounces
         As in :func:`project`.
+    start
+        Where it starts; ``None``: the origin. [m]
 
     Returns
     -------
     Its vertices [m], the walls, and the least distance of a bounce from its wall's rim [m].
     """
-    place, left, margin = np.zeros(3), path_length, np.inf
+    place = np.zeros(3) if start is None else start
+    left, margin = path_length, np.inf
     vertices, met = [place], list[int]()
     while len(met) < max_bounces:
         hits = [

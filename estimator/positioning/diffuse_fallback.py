@@ -84,22 +84,10 @@ def with_diffuse_search(
     diffuse = _placed(answer, fix, seen)
     if answer.status == "found" and (len(fix.rivals) or _confirms(diffuse, answer, walls)):
         return answer
-    if answer.status == "found" and _share(answer) > MOST_ENERGY:
-        if not _far_apart(answer, diffuse, uplink):
+    if _share(answer) > MOST_ENERGY and not _agreeing(answer, diffuse):
+        if answer.status == "found" and not _far_apart(answer, diffuse, uplink):
             return answer
-        # One wall's scattering is right in ALONE of all cases: so much it weighs against the path.
-        believed = answer.probability if answer.probability is not None else UNSTATED
-        odds = believed / max(1 - believed, LEAST_DOUBT) * (1 - ALONE) / ALONE
-        believed = odds / (1 + odds)
-        if believed >= CERTAIN:
-            return replace(answer, probability=believed)
-        return replace(
-            answer,
-            status="ambiguous",
-            reason="what the wall scatters comes from elsewhere than the path does",
-            probability=believed,
-            alternatives=(replace(diffuse, status="ambiguous", probability=1 - believed),),
-        )
+        return answer if len(fix.rivals) else _against_paths(answer, diffuse)
     if len(fix.rivals):
         if answer.status == "ambiguous":
             return answer
@@ -109,11 +97,44 @@ def with_diffuse_search(
             reason="what the wall scatters is explained as well by other places",
             alternatives=tuple(_moved(diffuse, rival) for rival in fix.rivals),
         )
-    agreeing = [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
+    agreeing = _agreeing(answer, diffuse)
     if len(agreeing) == 1:
         better = agreeing[0] if _spread(agreeing[0]) < _spread(diffuse) else diffuse
         return _among_alike(replace(better, paths=answer.paths), agreeing[0], answer)
     return _weighed(diffuse, fix, seen, answer)
+
+
+def _agreeing(answer: UserEstimate, diffuse: UserEstimate) -> list[UserEstimate]:
+    """Of an answer and its alternatives, those where the diffuse field comes from."""
+    return [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
+
+
+def _against_paths(answer: UserEstimate, diffuse: UserEstimate) -> UserEstimate:
+    """Weigh a diffuse field against paths that hold most of the energy and end elsewhere.
+
+    One wall's scattering is right in :data:`ALONE` of all cases: so much it weighs against them.
+    """
+    believed = answer.probability if answer.probability is not None else UNSTATED
+    odds = believed / max(1 - believed, LEAST_DOUBT) * (1 - ALONE) / ALONE
+    left = odds / (1 + odds)
+    if left >= CERTAIN:
+        return replace(answer, probability=left)
+    others = [one.probability or 0.0 for one in answer.alternatives]
+    against = ALONE * (1 - left)
+    share = (1 - left - against) / max(sum(others), LEAST_DOUBT)
+    return replace(
+        answer,
+        status="ambiguous",
+        reason=answer.reason or "what the wall scatters comes from elsewhere than the path does",
+        probability=left,
+        alternatives=(
+            replace(diffuse, status="ambiguous", probability=against),
+            *(
+                replace(one, probability=share * chance)
+                for one, chance in zip(answer.alternatives, others, strict=True)
+            ),
+        ),
+    )
 
 
 def _among_alike(better: UserEstimate, agreed: UserEstimate, answer: UserEstimate) -> UserEstimate:
@@ -214,7 +235,7 @@ def _settled(answer: UserEstimate) -> bool:
 
 def _share(answer: UserEstimate) -> float:
     """Energy of the paths that an answer rests on, over the pilot's. [-]."""
-    return sum(path.share for path in answer.paths if path.used)
+    return float(sum(path.share for path in answer.paths if path.used))
 
 
 def _far_apart(answer: UserEstimate, diffuse: UserEstimate, uplink: Uplink) -> bool:

@@ -158,7 +158,7 @@ def _search(anchors: Anchors) -> tuple[Float[np.ndarray, "cells 2"], float]:
     -------
     The smallest cells that may, and the highest score of places from which no wall is lit.
     """
-    reach = anchors.farthest
+    reach = float(anchors.farthest.max())
     low, high = anchors.places.min(axis=0) - reach, anchors.places.max(axis=0) + reach
     width = max(COARSEST, float(np.sqrt(np.prod(high - low) / MOST_CELLS)))
     axes = [np.arange(low[axis], high[axis], width) + width / 2 for axis in (0, 1)]
@@ -274,5 +274,8 @@ def _rivals(
             return np.array(rivals).reshape(-1, 3)
         centre = cells[int(np.argmax(np.where(left, scores, -np.inf)))]
         climbed = _refined(anchors, centre)
-        if climbed is not None and np.linalg.norm(climbed[0] - centre) < apart:
+        if climbed is None or np.linalg.norm(climbed[0] - centre) > apart:
+            continue
+        known = [place, *(rival[:2] for rival in rivals)]
+        if min(float(np.linalg.norm(climbed[0] - one)) for one in known) > apart:
             rivals.append(np.append(climbed[0], 0.0))

@@ -38,6 +38,10 @@ UNSEEN_SOMEWHERE = (
     "image does not show may have reflected it"
 )
 THROUGH_THE_WALL = "the wave may have come through the wall that seems to reflect it"
+THROUGH_A_PANE = (
+    "the level of the path falls over the band as that of a wave through a pane or a board: the "
+    "user may be nearer by the delay in it"
+)
 
 
 def on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
@@ -96,9 +100,9 @@ def _decided(
         wave = found.paths[only.path].wave
         if only.chain:
             way = look_along_legs(alone, wave, only.chain, room, found.how)
-            through[number] = through_odds(one, found, room)
         else:
             way = look_along(alone, wave, room, found.how)
+        through[number] = through_odds(one, found, room, way.sight)
         ways[number] = way
         odds[-1] = unseen_odds(one, found, room, way.sight, way.blocked) + through.get(number, 0.0)
     weights = np.exp(np.array(logs) - max(logs))
@@ -115,7 +119,8 @@ def _decided(
     ]
     passed = float(weights[best] * through.get(best, 0.0) / total)
     unseen = float(weights[best] * odds[best] / total) - passed
-    if passed > NEGLIGIBLE:
+    # That nothing is on a straight way is said at once; what seems reflected has two sides.
+    if passed > (NEGLIGIBLE if answer.bounces else 1 - CERTAIN):
         behind = behind_the_wall(answer, consistent[best], found)
         others.append(replace(behind, probability=passed))
     elsewhere = ways[best].otherwise if best in ways else None
@@ -124,7 +129,8 @@ def _decided(
     contradicted = strong_unexplained(consistent[best], found, room)
     elsewhere_too = sum(share for _, share in places[1:])
     if passed >= max(unseen, elsewhere_too) and not contradicted:
-        open_answer = ambiguous(answer, THROUGH_THE_WALL, others)
+        why = THROUGH_THE_WALL if answer.bounces else THROUGH_A_PANE
+        open_answer = ambiguous(answer, why, others)
         return replace(_likeliest_first(open_answer), line_of_sight=None)
     if best in ways and unseen >= elsewhere_too and not contradicted:
         doubt = ways[best].doubt or UNSEEN_SOMEWHERE

@@ -21,11 +21,15 @@ ones were within 0.3 dB of it.
 """
 
 from math import exp, hypot, pi, sqrt
+from typing import Literal
 
 from scipy.stats import norm
 
 from estimator.channel.path import Path
 from estimator.prediction.wall_reflection import ASSUMED_DB, ASSUMED_DEVIATION_DB, excess_db
+
+Way = Literal["direct", "reflected", "through"]
+"""How a wave came: through free space, over mirrors, or through a wall."""
 
 ISOTROPIC = 0.5
 """Prior probability that a user's antenna is an isotropic one: nothing is known of it. [-]"""
@@ -38,9 +42,9 @@ LEVEL_DEVIATION_DB = 0.1
 BLOCKED = 0.2
 """Probability that something blocks the straight way to a user whom a mirror shows. Chosen, not
 measured. [-]"""
-SMOOTH_METAL = 1 / 4
-"""Probability that a mirror is a conductor too smooth to lose anything, and to be seen: a third of
-the materials of the random rooms are metal, of which rough ones lose more than 0.1 dB. [-]"""
+SMOOTH_METAL = 1 / 20
+"""Probability that a mirror is a conductor too smooth to lose anything, and to be seen. In 2500
+random rooms 3 of some 88 isotropic users' reflected paths were within 0.3 dB of free space. [-]"""
 THROUGH_DB_PER_GHZ = 8 / 250
 """Least loss in a wall that a wave crosses, over the frequency: 4 mm of glass take 8 dB at 250 GHz,
 half an inch of plasterboard 24 dB (ITU-R P.2040-4). [dB/GHz]"""
@@ -57,9 +61,9 @@ THROUGH_TILT, MOST_THROUGH_TILT = 1.0, 72.0
 """Tilt of a wave that came through a wall, over the relative bandwidth: the least loss is alike for
 all laws of absorption from f on, the most is 40 dB by f^1.8 (plasterboard, ITU-R P.2040-4).
 Of two such paths of tuning rooms, through glass at 220-295 GHz, it was -5.3 and -6.3 dB. [dB]"""
-TILT_ERROR = 0.5
-"""Standard deviation of a measured tilt: waves nearer than the gate ripple. Direct paths of tuning
-rooms had -0.2 to 0 dB. [dB]"""
+TILT_ERRORS = ((0.95, 0.1), (0.05, 1.5))
+"""Shares of measured tilts and their standard deviations: of 38 direct paths of random rooms 34 had
+-0.18 to 0.11 dB, and the others, beside waves nearer than the gate, up to 2.6 dB. [-], [dB]"""
 MOST_BY_TILT = 1e3
 """Most that a tilt may weigh: the laws of absorption of no material are known that well. [-]"""
 TOLD_TO_DB = 1.0
@@ -90,9 +94,14 @@ def told_excess_db(excess: float) -> float | None:
 
 
 def level_density(
-    excess: float, reflections: int, *, first: bool = True, blocked: float = BLOCKED
+    excess: float,
+    reflections: int,
+    *,
+    first: bool = True,
+    blocked: float = BLOCKED,
+    tilted: float = 1.0,
 ) -> float:
-    """Return the density of an excess after so many reflections. [1/dB].
+    """Return the density of an excess, and of its tilt over a direct path's. [1/dB].
 
     Parameters
     ----------
@@ -104,6 +113,9 @@ def level_density(
         Whether no path arrives before it.
     blocked
         Probability that something blocks the straight way to the user. [-]
+    tilted
+        How much likelier the path's tilt is of a reflected wave than of a direct one; a conductor
+        without loss tilts nothing. [-]
     """
     seen = blocked if first and reflections else 1.0
     deviation = sqrt(LEVEL_DEVIATION_DB**2 + reflections * ASSUMED_DEVIATION_DB**2)
@@ -111,8 +123,9 @@ def level_density(
     normal = exp(-0.5 * away**2) / (sqrt(2 * pi) * deviation)
     lossless = exp(-0.5 * (excess / LEVEL_DEVIATION_DB) ** 2) / (sqrt(2 * pi) * LEVEL_DEVIATION_DB)
     metal = SMOOTH_METAL**reflections
-    normal = (1 - metal) * normal + metal * lossless
-    return ISOTROPIC * seen * normal + (1 - ISOTROPIC) / (MOST_DB - LEAST_DB)
+    lossy = (1 - metal) * (tilted if reflections else 1.0)
+    aimed = (1 - ISOTROPIC) / (MOST_DB - LEAST_DB)
+    return ISOTROPIC * seen * (lossy * normal + metal * lossless) + aimed * (lossy + metal)
 
 
 def through_density(excess: float, frequency: float) -> float:
@@ -130,8 +143,8 @@ def through_density(excess: float, frequency: float) -> float:
     return alike + AIMED_THROUGH / (MOST_DB - LEAST_DB)
 
 
-def through_by_tilt(tilt: float, frequency: float, bandwidth: float) -> float:
-    """Return how much likelier a tilt is of a wave through a wall than of a reflected one. [-].
+def by_tilt(tilt: float, frequency: float, bandwidth: float, *, way: Way, over: Way) -> float:
+    """Return how much likelier a tilt is of a wave that came one way than of another's. [-].
 
     Parameters
     ----------
@@ -139,16 +152,29 @@ def through_by_tilt(tilt: float, frequency: float, bandwidth: float) -> float:
         Change of the level over the band, over that of free space. [dB]
     frequency, bandwidth
         Centre and width of the band. [Hz]
+    way, over
+        Both ways.
     """
+    one, other = (_tilt_density(tilt, frequency, bandwidth, w) for w in (way, over))
+    if one > MOST_BY_TILT * other:
+        return MOST_BY_TILT
+    return max(one / other, 1 / MOST_BY_TILT)
+
+
+def _tilt_density(tilt: float, frequency: float, bandwidth: float, way: Way) -> float:
+    """Return the density of a measured tilt. [1/dB]."""
     share = bandwidth / frequency
     wide = share / TILT_BAND
-    deviation = hypot(REFLECTED_TILT_DEVIATION * wide, TILT_ERROR)
-    away = (tilt - REFLECTED_TILT * wide) / deviation
-    reflected = exp(-0.5 * away**2) / (sqrt(2 * pi) * deviation)
+    if way != "through":
+        mean = REFLECTED_TILT * wide if way == "reflected" else 0.0
+        spread = REFLECTED_TILT_DEVIATION * wide if way == "reflected" else 0.0
+        return sum(
+            chance * float(norm.pdf(tilt, mean, hypot(spread, error)))
+            for chance, error in TILT_ERRORS
+        )
     least = THROUGH_TILT * THROUGH_DB_PER_GHZ * frequency / 1e9 * share
     most = MOST_THROUGH_TILT * share
-    spread = norm.cdf((-least - tilt) / TILT_ERROR) - norm.cdf((-most - tilt) / TILT_ERROR)
-    through = float(spread) / (most - least)
-    if through > MOST_BY_TILT * reflected:
-        return MOST_BY_TILT
-    return max(through / reflected, 1 / MOST_BY_TILT)
+    return sum(
+        chance * float(norm.cdf((-least - tilt) / error) - norm.cdf((-most - tilt) / error))
+        for chance, error in TILT_ERRORS
+    ) / (most - least)

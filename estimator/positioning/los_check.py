@@ -11,28 +11,27 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from estimator.array.resolution_cell import Resolution
 from estimator.channel.path import Wave
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.geometry.specular_chains import Chain
 from estimator.geometry.wall_2d import Wall
+from estimator.positioning.blockage import (
+    LEAST_IMAGE_CONTRAST,
+    LOOSE_PEAKS,
+    USER_SIZE,
+    Sight,
+    chance_of_blockage,
+    hides_walls,
+    unseen_mirrors,
+    what_stands_in_the_way,
+)
 from estimator.positioning.level_likelihood import BLOCKED
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.posterior import WITH_A_MIRROR, Sight
 from estimator.positioning.unseen_mirrors import wall_behind, wall_between
 from estimator.results.estimate import UserEstimate
 
-LOOSE_PEAKS = 12
-"""Strongest peaks on no wall between which an unseen wall is suspected: 66 pairs. [-]"""
-BESIDE = 2.0
-"""Distance beside a ray within which a peak is on it, as for a line
-(:data:`estimator.walls.line_relations.BESIDE`). [cells]"""
-USER_SIZE = 0.05
-"""Distance before the end of a path within which the user's own body may echo: a handset. What is
-larger leaves the answer ambiguous. With half and twice of it the answers in ten rooms are the same
-(``python -m validation.experiments.thresholds decisions``). [m]"""
 LONGEST_UNSEEN = 0.5
 """Distance of two loose points beyond which they are not taken for the ends of one mirror on a leg
 that the array does not look along: walls of the random rooms are up to 0.3 m long. With half and
@@ -42,11 +41,6 @@ CLOUD = 6.0
 """Distance from a known wall up to which a loose point passes for a part of the wall's echo:
 sidelobes and what was scattered twice. With 3 and 12 the answers in ten rooms are the same
 (``python -m validation.experiments.thresholds decisions``). [cells c/2B]"""
-BLOCKED_BY_UNKNOWN = 0.05
-"""Probability that something that is not in the map blocks the straight way to a user whom a mirror
-shows, before a look at the image: a quarter of
-:data:`estimator.positioning.level_likelihood.BLOCKED`, since most of what blocks are walls that are
-found. [-]"""
 UNSEEN_BEYOND = (
     "beyond the wall the path passes between two points that may be the ends of another wall, too "
     "smooth to be seen"
@@ -55,11 +49,6 @@ EDGE_ON_BEYOND = (
     "beyond the wall the path passes behind a point that may be the near end of another wall, seen "
     "edge-on"
 )
-LEAST_IMAGE_CONTRAST = 300.0
-"""Intensity of the brightest in an image over its background, below which walls may be there that
-it does not show. As the noise in the echo of a wall of 0.01 mm rms was raised (36 draws), the wall
-was found in all images with more than 85, in some of those with 40 to 85 and in none with less; the
-rest is margin for walls that are farther or smoother. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +88,11 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
     mirrors = unseen_mirrors(heading, length, loose, room.resolution, how)
     others = [_over_one_more(answer, wave, (), mirror, room, how) for mirror in mirrors]
     if others:
-        chances = [chance_of_blockage(other, room, how) for other in others]
+        chances = [
+            chance_of_blockage(other.position, room, how)
+            for other in others
+            if other.position is not None
+        ]
         other, blocked = max(zip(others, chances, strict=True), key=lambda one: one[1])
         return StraightWay(
             sight="between ends",
@@ -225,17 +218,6 @@ def _over_one_more(
     )
 
 
-def hides_walls(contrast: float) -> bool:
-    """Tell whether an image without walls has too little contrast to exclude a wall.
-
-    Parameters
-    ----------
-    contrast
-        Intensity of the brightest in the image over its background. [-]
-    """
-    return contrast < LEAST_IMAGE_CONTRAST
-
-
 def too_noisy(contrast: float) -> str:
     """Return a message: the echo is too noisy for the image to exclude a wall."""
     return (
@@ -243,89 +225,3 @@ def too_noisy(contrast: float) -> str:
         f"above its noise, and below {10 * np.log10(LEAST_IMAGE_CONTRAST):.0f} dB walls may not "
         "show: over one the user is elsewhere; measure with less noise, or average more"
     )
-
-
-def unseen_mirrors(
-    heading: Float[np.ndarray, " 3"],
-    path_length: float,
-    unassigned_peaks: Float[np.ndarray, "peaks 3"],
-    resolution: Resolution,
-    how: Bearing,
-) -> list[FlatWall]:
-    """Return the walls between two peaks on no wall that the ray meets before its end.
-
-    Parameters
-    ----------
-    heading, path_length
-        Of the ray from the origin. [-], [m]
-    unassigned_peaks
-        The strongest peaks of the image that lie on no wall. [m]
-    resolution
-        Of the image: the peaks are known to a part of a cell, and so is the wall.
-    how
-        What the array measures of a direction.
-    """
-    points, met = unassigned_peaks, []
-    for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
-        wall = wall_between(points[first], points[second], resolution, how)
-        hit = None if wall is None else wall.hit(np.zeros(3), heading)
-        if wall is not None and hit is not None and hit[0] < path_length:
-            met.append(wall)
-    return met
-
-
-def chance_of_blockage(other: UserEstimate, room: MapContext, how: Bearing) -> float:
-    """Return the probability that something blocks the straight way to a user. [-].
-
-    The user is seen over a mirror, so the straight way, which is shorter, must be blocked or the
-    user's beam aimed elsewhere. The image shows what there is on that way as well.
-
-    Parameters
-    ----------
-    other
-        Where the user is over the mirror.
-    room, how
-        As in :func:`look_along`.
-    """
-    assert other.position is not None
-    far = float(np.linalg.norm(other.position))
-    heading = other.position / far
-    for wall in room.walls:
-        hit = wall.hit(np.zeros(3), heading)
-        if hit is not None and hit[0] < far - USER_SIZE:
-            return 1.0
-    if not room.shows(heading) or far > room.reach or hides_walls(room.contrast):
-        return BLOCKED
-    loose = room.unassigned_peaks
-    sight: Sight = "clear"
-    if what_stands_in_the_way(heading, far, loose, room.resolution.across_ray) is not None:
-        sight = "something on it"
-    elif unseen_mirrors(heading, far, loose[:LOOSE_PEAKS], room.resolution, how):
-        sight = "between ends"
-    odds = BLOCKED_BY_UNKNOWN / (1 - BLOCKED_BY_UNKNOWN) * WITH_A_MIRROR[sight]
-    return odds / (1 + odds)
-
-
-def what_stands_in_the_way(
-    heading: Float[np.ndarray, " 3"],
-    path_length: float,
-    unassigned_peaks: Float[np.ndarray, "peaks 3"],
-    cell: float,
-) -> Float[np.ndarray, " 3"] | None:
-    """Return the strongest peak on no wall that is on the ray before its end, if there is one.
-
-    Parameters
-    ----------
-    heading, path_length
-        Of the ray from the origin. [-], [m]
-    unassigned_peaks
-        Peaks of the image that lie on no wall, strongest first. [m]
-    cell
-        Resolution of the image across a ray, as an angle. [rad]
-    """
-    if not len(unassigned_peaks):
-        return None
-    ahead = unassigned_peaks @ heading
-    beside = np.linalg.norm(unassigned_peaks - ahead[:, None] * heading, axis=-1)
-    on_it = (ahead > 0) & (ahead < path_length - USER_SIZE) & (beside < BESIDE * cell * ahead)
-    return unassigned_peaks[int(np.argmax(on_it))] if on_it.any() else None

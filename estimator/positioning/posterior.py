@@ -18,7 +18,6 @@ path's level, since each reflection attenuates.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -26,8 +25,12 @@ from jaxtyping import Float
 from estimator.channel.path import Path, PathSet
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.specular_chains import Chain
+from estimator.positioning.blockage import WITH_A_MIRROR, Sight, chance_of_blockage
 from estimator.positioning.level_likelihood import (
     BLOCKED,
+    SMOOTH_METAL,
+    Way,
+    by_tilt,
     level_density,
     path_excess_db,
     told_excess_db,
@@ -44,24 +47,6 @@ UNSEEN = 0.05
 """Prior probability that a strong path which seems direct comes over a mirror that the map does not
 show. In 2500 random rooms, by the image method, 176 of 2079 strongest paths were reflected ones,
 some over walls that are seen. [-]"""
-
-Sight = Literal[
-    "clear", "clear aside", "not shown", "between ends", "behind a point", "something on it"
-]
-"""What the image shows on a straight way: nothing, within the angles without grating lobes or
-beyond; or it does not show it; two points that may be a mirror's ends; a point before it that may
-be the near end of a mirror seen edge-on; a point on it."""
-
-WITH_A_MIRROR: Mapping[Sight, float] = {
-    "clear": 1 / 8,
-    "clear aside": 1 / 3,
-    "not shown": 1.0,
-    "between ends": 2.5,
-    "behind a point": 1.0,
-    "something on it": 10.0,
-}
-"""How much likelier the image shows that where an unseen mirror is than where none is. Two points
-are about the straight way of 6 of 22 direct paths of tuning rooms, by chance. [-]"""
 
 CLEAR_UNSEEN = 5e-4
 """The probability of a mirror on a way that is shown clear, where levels tell nothing. Antennas
@@ -93,6 +78,10 @@ BESIDE_CELL = 3.0
 """Cells of the image within which another path is a part of the same wave: bent by roughness, it is
 fitted by two. [cells]"""
 
+LARGER_PART = 2.0
+"""Share of energy, over that of the path beside it, from which a path is no part of the other's
+wave but the other way round. [-]"""
+
 PART = 0.1
 """Share of energy, over a path's, from which another beside it is a part of the same wave: a tenth
 moves its level by 0.4 dB. [-]"""
@@ -100,6 +89,10 @@ moves its level by 0.4 dB. [-]"""
 RINGS = (0.25, 0.5, 0.75, 1.0)
 """Angles beside a path's own, over its reach of two deviations, at which its ray is tried: half a
 deviation apart. [-]"""
+
+NO_SHADOW = 0.05
+"""Probability that something that the map does not show shadows a part of the array. Chosen, not
+measured. [-]"""
 
 LEAST_CHAIN = 1e-12
 """Least probability of a chain that no ray about a path meets: its logarithm stays finite. [-]"""
@@ -122,8 +115,20 @@ def chain_probabilities(
     bearing, how = path.wave.bearing, found.how
     weights: dict[Chain, float] = {}
 
+    def met_from(start: Float[np.ndarray, " 3"], image: Float[np.ndarray, " 3"]) -> Chain:
+        way = image - start
+        far = float(np.linalg.norm(way))
+        return trace(way / far, far, room.walls, start=start)[1]
+
     def meet(turned: np.ndarray, weight: float) -> None:
-        chain = trace(how.towards(turned), length, room.walls)[1]
+        image = length * how.towards(turned)
+        if path.shadow is None:
+            chain = met_from(np.zeros(3), image)
+        else:
+            # What shadows some elements takes them another chain.
+            chain = met_from(path.shadow.reached, image)
+            if met_from(path.shadow.dark, image) == chain:
+                weight *= NO_SHADOW
         weights[chain] = weights.get(chain, 0.0) + weight
 
     meet(bearing, 1.0)
@@ -153,12 +158,21 @@ def log_weight(
         excess = level_of(path, found, room)
         if excess is not None:
             first = arrives_first(path, found, room)
-            total += np.log(level_density(excess, len(chain), first=first))
+            blocked = BLOCKED
+            if chain and first:
+                blocked = chance_of_blockage(consensus.position, room, found.how)
+            tilted = tilt_ratio(path, found, way="reflected", over="direct")
+            weight = level_density(excess, len(chain), first=first, blocked=blocked, tilted=tilted)
+            total += np.log(weight)
     for index in chains:
         if index in used:
             continue
         path = found.paths[index]
-        if any(beside(path, found.paths[other], room) for other in used):
+        if any(
+            beside(path, found.paths[other], room)
+            and path.share < LARGER_PART * found.paths[other].share
+            for other in used
+        ):
             continue  # a part of a wave that is explained
         total += np.log(_unexplained(path.share / strongest) / _directions(found, path))
         if straight is not None and path.wave.path_length < straight - early:
@@ -187,6 +201,13 @@ def level_of(path: Path, found: PathSet, room: MapContext) -> float | None:
         return None
     amplitude = float(np.sqrt(rest * found.power))
     return told_excess_db(excess_db(amplitude, path.wave.path_length, found.frequency))
+
+
+def tilt_ratio(path: Path, found: PathSet, *, way: Way, over: Way) -> float:
+    """Return how much likelier a path's tilt is for one way than for another; 1 if unknown. [-]."""
+    if path.tilt_db is None or found.bandwidth is None or found.frequency is None:
+        return 1.0
+    return by_tilt(path.tilt_db, found.frequency, found.bandwidth, way=way, over=over)
 
 
 def arrives_first(path: Path, found: PathSet, room: MapContext) -> bool:
@@ -238,12 +259,17 @@ def unseen_odds(
         odds = CLEAR_UNSEEN
     else:
         odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[sight]
+    tilted = tilt_ratio(path, found, way="reflected", over="direct")
+    if excess is None and not only.chain:
+        odds *= SMOOTH_METAL + (1 - SMOOTH_METAL) * tilted
     if excess is not None:
         bounces = len(only.chain)
         first = arrives_first(path, found, room)
         hidden = BLOCKED if bounces else blocked
-        odds *= level_density(excess, bounces + 1, first=first, blocked=hidden)
-        odds /= level_density(excess, bounces, first=first)
+        more_mirrors = level_density(
+            excess, bounces + 1, first=first, blocked=hidden, tilted=tilted
+        )
+        odds *= more_mirrors / level_density(excess, bounces, first=first, tilted=tilted)
     return odds * more
 
 

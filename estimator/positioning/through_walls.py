@@ -13,19 +13,22 @@ import numpy as np
 
 from estimator.channel.path import PathSet
 from estimator.geometry.path_tracing import project
+from estimator.positioning.blockage import WITH_A_MIRROR, Sight
 from estimator.positioning.level_likelihood import (
     level_density,
-    through_by_tilt,
     through_density,
 )
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.posterior import arrives_first, level_of
+from estimator.positioning.posterior import arrives_first, level_of, tilt_ratio
 from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
 THROUGH = 0.1
 """Prior probability that a lone path which seems to be reflected came through the wall. Of 4 such
 paths in 41 tuning rooms, of which two thirds of the walls are dielectrics, one had. [-]"""
+UNSEEN_PANE = 0.02
+"""Prior probability that a lone path which seems direct came through a wall that the map does not
+show. Of 39 such paths in random rooms one had. [-]"""
 LEVEL_UNKNOWN = 1e-4
 """The same where the level tells nothing: antennas with a gain are aimed at what they see. With
 half and twice of it the answers in ten rooms are the same (``python -m
@@ -40,26 +43,30 @@ SHIFT_DEVIATION = 2e-3
 half an inch of plasterboard. [m]"""
 
 
-def through_odds(explanation: Consensus, found: PathSet, room: MapContext) -> float:
-    """Return the odds that a lone path came straight through the wall that is said to reflect it.
+def through_odds(explanation: Consensus, found: PathSet, room: MapContext, sight: Sight) -> float:
+    """Return the odds that a lone path came straight through a wall. [-].
 
     Parameters
     ----------
     explanation
-        Of the path: reflected by one wall or more.
+        Of the path: reflected by a wall, which it may have come through; or direct, through one
+        that the map does not show.
     found, room
         The paths and the map.
+    sight
+        What the image shows on the straight way of a direct path.
     """
     (only,) = explanation.sightings
-    path = found.paths[only.path]
+    path, bounces = found.paths[only.path], len(only.chain)
     excess = level_of(path, found, room)
-    by_tilt = 1.0
-    if path.tilt_db is not None and found.bandwidth is not None and found.frequency is not None:
-        by_tilt = through_by_tilt(path.tilt_db, found.frequency, found.bandwidth)
+    tilted = tilt_ratio(path, found, way="through", over="reflected" if bounces else "direct")
+    prior = 1.0 if bounces else WITH_A_MIRROR[sight]
     if excess is None or found.frequency is None:
-        return LEVEL_UNKNOWN * by_tilt
-    reflected = level_density(excess, len(only.chain), first=arrives_first(path, found, room))
-    return THROUGH * through_density(excess, found.frequency) / reflected * by_tilt
+        return prior * LEVEL_UNKNOWN * tilted
+    # Tilts are compared above.
+    level = level_density(excess, bounces, first=arrives_first(path, found, room))
+    prior *= THROUGH if bounces else UNSEEN_PANE
+    return prior * through_density(excess, found.frequency) / level * tilted
 
 
 def behind_the_wall(alone: UserEstimate, explanation: Consensus, found: PathSet) -> UserEstimate:

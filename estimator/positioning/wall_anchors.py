@@ -49,11 +49,9 @@ class Anchors:
     wall: np.ndarray  # index of each point's wall
     scores: Float[np.ndarray, "points distances"]  # ln(1 + I/σ²)
     step: float  # of the distances [m]
-
-    @property
-    def farthest(self) -> float:
-        """Largest distance that is told apart. [m]."""
-        return float(self.step * self.scores.shape[1])
+    farthest: Float[np.ndarray, " points"]
+    """Largest distance that is told apart: the whole path, to the point and on to the array, is
+    known up to the unambiguous one only. What seems farther came sooner than over the wall. [m]"""
 
     @cached_property
     def splines(self) -> Float[np.ndarray, "points distances"]:
@@ -111,7 +109,7 @@ def wall_anchors(uplink: Uplink, walls: Sequence[SeenWall]) -> Anchors:
     """Focus a pilot on points of all walls: two for each cross-range cell."""
     wavelength = speed_of_light / float(uplink.frequencies.mean())
     beam = wavelength / float(np.ptp(uplink.positions[:, 0]))
-    places, normals, owner, scores = [], [], [], []
+    places, normals, owner, scores, farthest = [], [], [], [], []
     step = 0.0
     for index, wall in enumerate(walls):
         along = wall.seen.end - wall.seen.start
@@ -121,7 +119,9 @@ def wall_anchors(uplink: Uplink, walls: Sequence[SeenWall]) -> Anchors:
         across = abs(along[0] * middle[1] - along[1] * middle[0]) / far**2
         count = max(STRETCHES, round(POINTS_PER_CELL * across / beam))
         shares = ((np.arange(count) + 0.5) / count)[:, None]
-        intensity, step = further_distances(uplink, wall.seen.start + shares * along)
+        points = wall.seen.start + shares * along
+        intensity, step = further_distances(uplink, points)
+        farthest.append(step * intensity.shape[1] - np.linalg.norm(points, axis=-1))
         background = np.median(intensity, axis=1, keepdims=True)
         scores.append(np.log1p(intensity / (background + SIDELOBES * intensity.max())))
         true = wall.true.end - wall.true.start
@@ -138,6 +138,7 @@ def wall_anchors(uplink: Uplink, walls: Sequence[SeenWall]) -> Anchors:
         wall=np.concatenate(owner),
         scores=np.concatenate(scores),
         step=step,
+        farthest=np.concatenate(farthest),
     )
 
 
@@ -153,7 +154,7 @@ def distances_from(
     apart = places - anchors.places[:, None]
     before = np.einsum("pnx,px->pn", apart, anchors.normals) > 0
     distance = np.linalg.norm(apart, axis=-1)
-    return distance, before & (distance < anchors.farthest)
+    return distance, before & (distance < anchors.farthest[:, None])
 
 
 def score_indices(

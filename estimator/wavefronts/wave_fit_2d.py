@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor, cho_solve
 
@@ -71,6 +71,7 @@ class WaveStart:
     aoa: float  # [rad]
     path_length: float  # [m]
     radius: float | None = None  # of curvature; None: it is the path length, also in the fit [m]
+    lit: Bool[np.ndarray, " elements"] | None = None  # the elements that it reaches; None: all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,7 @@ class SphericalWave:
     gain: complex  # field at the array's centre, at zero path length [-]
     covariance: Float[np.ndarray, "parameters parameters"]  # of aoa, path length (, radius)
     explained: float  # its energy over the uplink's; of orthogonal waves, their shares [-]
+    lit: Bool[np.ndarray, " elements"] | None = None  # the elements that it reaches; None: all
 
     @property
     def bearing(self) -> Float[np.ndarray, " 1"]:
@@ -147,7 +149,8 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
     ]
     first = [values.copy() for values in parameters]
     lobe = _main_lobe(uplink, wavenumbers)
-    state = _linearised(uplink, wavenumbers, parameters)
+    lit = [start.lit for start in starts]
+    state = _linearised(uplink, wavenumbers, parameters, lit)
     floor = FLOOR * np.sqrt(np.mean(np.abs(uplink.samples) ** 2))
     for _ in range(ITERATIONS):
         bread = _inverse(state.normal, starts)
@@ -157,7 +160,7 @@ def fit_spherical_waves(uplink: Uplink, starts: Sequence[WaveStart]) -> FittedWa
         )
         # Far from the peak the linear model overshoots.
         moves = [step[2:] / max(1.0, limit) for step in steps]
-        moved = _moved(uplink, wavenumbers, parameters, moves, state)
+        moved = _moved(uplink, wavenumbers, parameters, moves, state, lit)
         if moved is None:
             break
         last, parameters, state = state, *moved
@@ -220,12 +223,13 @@ def _moved(
     parameters: Sequence[Float[np.ndarray, " _"]],
     moves: Sequence[Float[np.ndarray, " _"]],
     state: _Linear,
+    lit: Sequence[Bool[np.ndarray, " elements"] | None],
 ) -> tuple[list[Float[np.ndarray, " _"]], _Linear] | None:
     """Take a step, shortened until the residual falls; None: it falls no more."""
     before = float(np.vdot(state.residual, state.residual).real)
     for shorter in range(SHORTENED + 1):
         there = [values + move / 2**shorter for values, move in zip(parameters, moves, strict=True)]
-        taken = _linearised(uplink, wavenumbers, there)
+        taken = _linearised(uplink, wavenumbers, there, lit)
         if float(np.vdot(taken.residual, taken.residual).real) <= before * (1 + ROUNDING):
             return there, taken
     return None
@@ -257,6 +261,7 @@ def _linearised(
     uplink: Uplink,
     wavenumbers: Float[np.ndarray, " freqs"],
     parameters: Sequence[Float[np.ndarray, " _"]],
+    lit: Sequence[Bool[np.ndarray, " elements"] | None],
 ) -> _Linear:
     """Linearise about parameters, with the gains that fit best.
 
@@ -272,7 +277,8 @@ def _linearised(
             path_length=float(values[1]),
             radius=float(values[-1]),
         )
-        for values in parameters
+        * (1.0 if mask is None else mask[:, None])
+        for values, mask in zip(parameters, lit, strict=True)
     ]
     gram = np.array([[np.vdot(one, other) for other in units] for one in units])
     against = np.array([np.vdot(unit, uplink.samples) for unit in units])
@@ -354,8 +360,9 @@ def _described(
     ends = [*state.bounds, len(bread)]
     count = wavenumbers.size
     falling = np.sqrt(2) * np.cos(np.pi * (np.arange(count) + 0.5) / count)
-    for field, slopes, end in zip(state.fields, state.slopes, ends, strict=True):
-        error = wavefront_error(state.residual, field, noise)
+    for field, slopes, end, start in zip(state.fields, state.slopes, ends, starts, strict=True):
+        reached = slice(None) if start.lit is None else start.lit
+        error = wavefront_error(state.residual[reached], field[reached], noise)
         # What an error of the phase alone does to Jᵀe: it has the columns' part along j·wave.
         power = np.abs(field) * np.sqrt(np.mean(np.abs(field) ** 2))
         for variance, shape in ((error.mean, np.ones(count)), (error.slope, falling)):
@@ -372,7 +379,9 @@ def _described(
     energy = float(np.vdot(uplink.samples, uplink.samples).real)
     waves = []
     last = 0
-    for values, gain, field in zip(parameters, state.gains, state.fields, strict=True):
+    for values, gain, field, start in zip(
+        parameters, state.gains, state.fields, starts, strict=True
+    ):
         own = slice(last, last := last + len(values))
         waves.append(
             SphericalWave(
@@ -382,6 +391,7 @@ def _described(
                 gain=complex(gain),
                 covariance=covariance[own, own],
                 explained=float(np.vdot(field, field).real) / energy,
+                lit=start.lit,
             )
         )
     return FittedWaves(

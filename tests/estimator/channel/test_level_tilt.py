@@ -10,7 +10,7 @@ from scipy.constants import speed_of_light
 from estimator.channel.level_tilt import FEWEST, with_level_tilts
 from estimator.channel.path import Path, PathSet
 from estimator.measurement.model import Uplink
-from estimator.positioning.level_likelihood import MOST_BY_TILT, through_by_tilt
+from estimator.positioning.level_likelihood import MOST_BY_TILT, by_tilt
 from estimator.wavefronts.wave_fit_2d import SphericalWave
 
 FREQUENCIES = np.linspace(220e9, 295e9, 201)
@@ -74,9 +74,14 @@ def test_of_few_or_uneven_frequencies_nothing_is_told() -> None:
     assert with_level_tilts(few, paths()).paths[0].tilt_db is None
 
 
-def test_a_flat_level_speaks_for_a_mirror_and_a_steep_one_for_a_pane() -> None:
-    flat, steep = through_by_tilt(-0.2, 257.5e9, 75e9), through_by_tilt(-5.5, 257.5e9, 75e9)
-    assert flat == pytest.approx(1 / MOST_BY_TILT)
-    assert steep > 5
+def test_a_flat_level_speaks_for_free_space_and_a_steep_one_for_a_pane() -> None:
+    band = (257.5e9, 75e9)
+    assert by_tilt(-0.2, *band, way="through", over="reflected") < 0.1
+    assert by_tilt(-5.5, *band, way="through", over="reflected") > 5
+    assert by_tilt(-0.05, *band, way="reflected", over="direct") < 0.1
+    assert by_tilt(-1.5, *band, way="reflected", over="direct") > 10
+    assert by_tilt(-20.0, *band, way="through", over="direct") == MOST_BY_TILT
     # A narrow band tells nothing: every slope over it is small.
-    assert 0.2 < through_by_tilt(0.0, 60e9, 0.5e9) < 5
+    narrow = (60e9, 0.2e9)
+    assert by_tilt(0.0, *narrow, way="reflected", over="direct") == pytest.approx(1.0, abs=0.1)
+    assert 0.2 < by_tilt(0.0, *narrow, way="through", over="direct") < 5

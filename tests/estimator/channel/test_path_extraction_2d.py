@@ -163,3 +163,32 @@ def test_the_search_starts_within_the_summit_of_any_curvature(
     # The grid of radii is a radian of sagitta apart: k·h²·sin²θ/2 · Δ(1/R).
     sagitta = 0.5 * 2 * np.pi * 257.5e9 / speed_of_light * 15.75e-3**2
     assert abs(1 / start.radius - 1 / radius) <= 2.0 / (sagitta * np.sin(np.radians(60)) ** 2)
+
+
+@pytest.mark.parametrize("reached", [slice(0, 30), slice(26, 64), slice(14, 52)])
+def test_a_wave_that_an_edge_shadows_is_one_wave_from_its_true_source(
+    world: Any, reached: slice
+) -> None:
+    place = source(75.0, 0.38)
+    samples = pilot(world, place)
+    lit = np.zeros(COUNT, dtype=bool)
+    lit[reached] = True
+    samples[~lit] *= 0.03
+    (path,) = waves(world, world.noisy(samples, 15.0, np.random.default_rng(5)))
+    assert path.shadow is not None
+    # The median over five elements moves an edge by two at most.
+    assert np.count_nonzero(path.shadow.lit != lit) <= 4
+    np.testing.assert_allclose(path.shadow.reached, world.array(COUNT)[lit].mean(axis=0), atol=1e-3)
+    assert path.specular
+    assert path.share == pytest.approx(1.0, abs=0.03)
+    errors = np.array([path.wave.bearing[0] - np.radians(75.0), path.wave.path_length - 0.38])
+    square = errors @ np.linalg.solve(path.wave.covariance, errors)
+    assert square < 13.8  # χ² of two: one in a thousand
+
+
+def test_two_waves_and_a_bent_front_are_no_shadow(world: Any) -> None:
+    rng = np.random.default_rng(7)
+    both = pilot(world, source(70.0, 0.3)) + 0.8 * pilot(world, source(74.0, 0.3))
+    bent = pilot(world, source(80.0, 0.35)) * np.exp(0.5j * rng.standard_normal((COUNT, 1)))
+    for samples in (both, bent):
+        assert all(path.shadow is None for path in waves(world, samples))

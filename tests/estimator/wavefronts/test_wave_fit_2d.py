@@ -262,7 +262,7 @@ def test_the_likelihoods_curvature_is_that_of_differences() -> None:
     noise = 0.1 * (rng.standard_normal((40, 41)) + 1j * rng.standard_normal((40, 41)))
     samples = model(1.3, 0.8, 0.5) + model(1.35, 0.81, 0.81, gain=0.2j) + noise
     places = [np.array([1.302, 0.8003, 0.52]), np.array([1.349, 0.8099])]  # free, and bound
-    state = _linearised(pilot(samples), 2 * np.pi * BAND / speed_of_light, places)
+    state = _linearised(pilot(samples), 2 * np.pi * BAND / speed_of_light, places, [None, None])
 
     def half_energy(columns: Float[np.ndarray, " 9"]) -> float:
         """Half of what is left, with the amplitude ratios as they are."""
@@ -307,7 +307,7 @@ def test_two_waves_half_a_cell_apart_converge_to_a_summit_of_the_likelihood() ->
     ]
     fitted = fit_spherical_waves(pilot(samples), starts)
     places = [np.array([one.aoa, one.path_length, one.radius]) for one in fitted.waves]
-    state = _linearised(pilot(samples), 2 * np.pi * BAND / speed_of_light, places)
+    state = _linearised(pilot(samples), 2 * np.pi * BAND / speed_of_light, places, [None, None])
     # The slope left would move no parameter by more than the step at which the fit ends.
     step = np.linalg.solve(state.hessian, state.scores.sum(axis=0))
     deviations = np.sqrt(
