@@ -68,7 +68,7 @@ def _decision(module: str, name: str, low: float, high: float) -> Scan:
 
 
 DECISION_SCANS = (
-    _decision("los_check", "USER_SIZE", 0.025, 0.1),
+    _decision("blockage", "USER_SIZE", 0.025, 0.1),
     _decision("los_check", "LONGEST_UNSEEN", 0.25, 1.0),
     _decision("los_check", "CLOUD", 3.0, 12.0),
     _decision("unseen_mirrors", "EDGE_ON_TILT", 0.075, 0.3),
