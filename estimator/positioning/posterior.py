@@ -86,13 +86,14 @@ PART = 0.1
 """Share of energy, over a path's, from which another beside it is a part of the same wave: a tenth
 moves its level by 0.4 dB. [-]"""
 
-RINGS = (0.25, 0.5, 0.75, 1.0)
+RINGS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 """Angles beside a path's own, over its reach of two deviations, at which its ray is tried: half a
-deviation apart. [-]"""
+deviation apart, and beyond two of them one, to the fourth. A level may say a thousand times over
+that a ray passes beside a wall. [-]"""
 
-NO_SHADOW = 0.05
-"""Probability that something that the map does not show shadows a part of the array. Chosen, not
-measured. [-]"""
+NO_SHADOW = 0.25
+"""Probability that what shadows a part of the array is nothing that the map shows: so in one of the
+four shadowed waves of 66 random rooms. [-]"""
 
 LEAST_CHAIN = 1e-12
 """Least probability of a chain that no ray about a path meets: its logarithm stays finite. [-]"""

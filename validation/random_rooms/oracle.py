@@ -198,8 +198,11 @@ def shown_walls(echo: Echo, sector: ImagedSector, truth: Truth) -> tuple[str, ..
     taper = survey_weights(echo)
 
     def intensity(points: Float[np.ndarray, "points 3"]) -> Float[np.ndarray, " points"]:
-        values = np.abs(backproject(echo, points, weights=taper)) ** 2
-        return np.asarray(values, dtype=np.float64)
+        # Walls go on beyond the range up to which the echo is unambiguous.
+        within = np.linalg.norm(points, axis=-1) <= sector.farthest
+        values = np.zeros(len(points))
+        values[within] = np.abs(backproject(echo, points[within], weights=taper)) ** 2
+        return values
 
     background = mean_background(intensity(sector.scattered()))
     shown = []

@@ -310,6 +310,28 @@ def test_a_second_path_tells_whether_the_first_meets_a_walls_very_end(dim: Dimen
     at(found, user)
 
 
+def test_at_the_level_of_free_space_a_wall_that_seems_too_long_leaves_the_answer_open(
+    dim: Dimension,
+) -> None:
+    # The ray meets the wall 1.4 reaches before its end, which the image shows to a cell.
+    turn = 1.4 * (RESOLUTION.across_ray + 3 * ANGLE)
+    place = 1.3 * np.array(
+        [END[0] * np.cos(turn) - END[1] * np.sin(turn), END[0] * np.sin(turn) + END[1], 0.0]
+    )
+    wave = direct(dim, place)
+    gain = speed_of_light / 60e9 / (4 * np.pi * float(np.linalg.norm(place)))
+    strong = replace(wave, wave=replace(wave.wave, gain=complex(gain)))
+    room_shown = room(slanted(dim))
+    found = decide("user", replace(together(dim, [strong]), frequency=60e9), room_shown)
+    assert found.status == "ambiguous"
+    places = [one.position for one in (found, *found.alternatives) if one.position is not None]
+    assert min(float(np.linalg.norm(one - place)) for one in places) < 5e-3
+    # 10 dB below, it is a reflected wave for sure.
+    weak = replace(wave, wave=replace(wave.wave, gain=complex(gain / 10**0.5)))
+    found = decide("user", replace(together(dim, [weak]), frequency=60e9), room_shown)
+    assert found.bounces == 1
+
+
 def test_a_ray_between_two_loose_points_may_pass_over_a_wall_too_smooth_to_be_seen(
     dim: Dimension,
 ) -> None:
