@@ -88,3 +88,10 @@ def test_a_row_of_speckle_is_shown_and_a_wall_that_is_not_there_is_not() -> None
         wall_end={"real": end, "imagined": end - beside},
     )
     assert shown_walls(drawn.echo, imaged_sector(drawn.echo), truth) == ("real",)
+
+
+def test_a_wall_that_goes_on_beyond_the_unambiguous_range_stops_no_oracle() -> None:
+    # 201 frequencies are unambiguous up to 400 mm, and the wall reaches 412 mm from the array.
+    said = asked(room((0.05, 0.25), length=0.34))
+    assert said.answerable
+    assert said.shown == ("wall",)
