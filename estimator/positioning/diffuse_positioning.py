@@ -71,9 +71,8 @@ ROUNDS = 4
 
 RIVAL = 0.9
 """Score, over the best one (both less the mean score), that makes a place a rival. ``python -m
-validation.experiments.thresholds answers``: of 16 pilots over a rough wall, 14 are placed right,
-one 2 mm off and outside of its region, and one has rivals, with 0.95 as with this; with 0.8 one
-more has rivals. [-]"""
+validation.experiments.thresholds answers``: of 16 pilots over a rough wall 15 are placed right and
+one 2 mm off, outside of its region, with 0.8 and 0.95 as with this. [-]"""
 
 MOST_RIVALS = 8
 """Most rivals that are told apart: with so many, one more changes no answer. [-]"""
@@ -127,15 +126,16 @@ def search_diffuse(uplink: Uplink, walls: Sequence[SeenWall]) -> DiffuseFix | No
     wall = int(np.argmax(shares))
     if shares[wall] < FEWEST_LIT:
         return None
+    rivals, spread = _rivals(anchors, cells, scores, place, covariance)
     full = np.zeros((3, 3))
-    full[:2, :2] = covariance
+    full[:2, :2] = covariance + spread
     return DiffuseFix(
         position=np.append(place, 0.0),
         covariance=full,
         wall=wall,
         lit=shares[wall],
         several=_several(walls, wall, shares),
-        rivals=_rivals(anchors, cells, scores, place, covariance),
+        rivals=rivals,
     )
 
 
@@ -260,22 +260,30 @@ def _rivals(
     scores: Float[np.ndarray, " cells"],
     place: Float[np.ndarray, " 2"],
     covariance: Float[np.ndarray, "2 2"],
-) -> Float[np.ndarray, "rivals 3"]:
-    """Other positions that explain the pilot nearly as well: separate local maxima. [m]."""
+) -> tuple[Float[np.ndarray, "rivals 3"], Float[np.ndarray, "2 2"]]:
+    """Find other positions that explain the pilot nearly as well.
+
+    Returns
+    -------
+    Separate local maxima [m], and the spread of those that are one with the place [m²].
+    """
     chance = float(np.median(anchors.scores)) * len(anchors.scores)
     left = scores >= chance + RIVAL * (float(scores.max()) - chance)
     apart = RIVAL_APART * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     apart += SAMPLES_PER_CELL * anchors.step
     rivals: list[np.ndarray] = []
+    spread = np.zeros((2, 2))
     centre = place
     while True:
         left = left & (np.linalg.norm(cells - centre, axis=-1) > apart)
         if not left.any() or len(rivals) == MOST_RIVALS:
-            return np.array(rivals).reshape(-1, 3)
+            return np.array(rivals).reshape(-1, 3), spread
         centre = cells[int(np.argmax(np.where(left, scores, -np.inf)))]
         climbed = _refined(anchors, centre)
         if climbed is None or np.linalg.norm(climbed[0] - centre) > apart:
             continue
-        known = [place, *(rival[:2] for rival in rivals)]
-        if min(float(np.linalg.norm(climbed[0] - one)) for one in known) > apart:
+        off = climbed[0] - place
+        if np.linalg.norm(off) < apart:
+            spread = max(spread, np.outer(off, off), key=np.trace)
+        elif all(np.linalg.norm(climbed[0] - rival[:2]) > apart for rival in rivals):
             rivals.append(np.append(climbed[0], 0.0))

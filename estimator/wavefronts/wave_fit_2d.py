@@ -1,14 +1,10 @@
 r"""Maximum-likelihood fit of spherical waves to an uplink, together, below the grid, in float64.
 
 The model of each wave is (3-10) of the thesis with the delay and the curvature of the wavefront
-as separate lengths,
-
-.. math:: u_{mn} = \alpha \frac{R_c}{r_m} e^{-j k_n (r_m - R_c + R)}, \qquad
-          r_m = \lVert R_c\,\hat s(\theta) - q_m \rVert .
-
-A direct path, or one over flat mirrors, has :math:`R_c = R`: the image of the user radiates
-as the user does. A wave that a point (an edge, a rough patch) scatters keeps the path's
-delay, but its curvature is that of the last leg alone. Comparing both tells them apart.
+as separate lengths (:mod:`estimator.wavefronts.wave_model_2d`). A direct path, or one over flat
+mirrors, has :math:`R_c = R`: the image of the user radiates as the user does. A wave that a point
+(an edge, a rough patch) scatters keeps the path's delay, but its curvature is that of the last leg
+alone. Comparing both tells them apart.
 
 All waves of a pilot are fitted at once (RELAX in the limit), so that the sidelobes of one do not
 bias another. The covariance contains the noise and the wavefront's phase error
@@ -46,7 +42,7 @@ SHORTENED = 6
 """Times that a step is halved until the residual does not grow: after these it is lost in rounding.
 [-]"""
 ROUNDING = 1e-12
-"""Growth of the residual's energy that is none: the rounding of float64 over 1e5 samples. [-]"""
+"""Growth of the residual's energy that is none: rounding over 1e5 samples. [-]"""
 LONGEST_STEP = 0.5
 """Largest step, in main lobes: the model is linear over less. [-]"""
 LONGEST_RADIUS_STEP = 0.3

@@ -106,11 +106,11 @@ def test_a_user_in_sight_is_a_right_answer_and_is_lost_where_no_path_may_count()
     assert not answer_row(one, {own: lost, 2.0: replace(seen, right=3)}).passed
 
 
-def test_a_user_over_a_rough_wall_is_placed_unless_a_weaker_place_is_a_rival() -> None:
+def test_a_user_over_a_rough_wall_is_placed_unless_no_wall_may_count_as_lit() -> None:
     pilot = rough_pilot(60.0, 0.05, 0)
     placed = diffuse_answers([pilot])
     assert (placed.right, placed.wrong) == (1, 0)
-    with changed(RIVAL_SCAN.module, RIVAL_SCAN.name, 0.8):
+    with changed(RIVAL_SCAN.module, "FEWEST_LIT", 1.1):
         open_ = diffuse_answers([pilot])
     assert (open_.right, open_.wrong) == (0, 0)
 
