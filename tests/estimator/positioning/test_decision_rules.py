@@ -319,6 +319,7 @@ def test_at_the_level_of_free_space_a_wall_that_seems_too_long_leaves_the_answer
         [END[0] * np.cos(turn) - END[1] * np.sin(turn), END[0] * np.sin(turn) + END[1], 0.0]
     )
     wave = direct(dim, place)
+    assert isinstance(wave.wave, SphericalWave | Wavefront)
     gain = speed_of_light / 60e9 / (4 * np.pi * float(np.linalg.norm(place)))
     strong = replace(wave, wave=replace(wave.wave, gain=complex(gain)))
     room_shown = room(slanted(dim))
