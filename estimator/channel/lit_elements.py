@@ -8,6 +8,8 @@ The fringes beside the edge of a shadow are not modelled: they bend what is left
 wave that they bend much is no mirror-like one (:attr:`estimator.channel.path.Path.specular`).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import label, median_filter
@@ -82,9 +84,4 @@ def part_of(uplink: Uplink, lit: Bool[np.ndarray, " elements"] | None) -> Uplink
     """
     if lit is None:
         return uplink
-    return Uplink(
-        samples=uplink.samples[lit],
-        positions=uplink.positions[lit],
-        frequencies=uplink.frequencies,
-        user=uplink.user,
-    )
+    return replace(uplink, samples=uplink.samples[lit], positions=uplink.positions[lit])

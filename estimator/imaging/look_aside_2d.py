@@ -12,7 +12,7 @@ from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolutio
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.peak_detection import peak_threshold, peaks_above
-from estimator.imaging.survey_2d import STEP, Survey
+from estimator.imaging.survey_2d import STEP, Survey, sector_points
 from estimator.measurement.model import Echo
 
 HALF_WIDTH = 0.4
@@ -56,7 +56,7 @@ def peaks_aside(
     low = max(float(heading[0]) - HALF_WIDTH, -WIDEST_SINE)
     high = min(float(heading[0]) + HALF_WIDTH, WIDEST_SINE)
     count = int(np.ceil((high - low) / (STEP * resolution.across_ray))) + 2
-    points = _polar(ranges[:, None], np.linspace(low, high, count))
+    points = sector_points(ranges[:, None], np.linspace(low, high, count))
     taper = survey_weights(echo)
     intensity = np.abs(backproject(echo, points, weights=taper)) ** 2
     threshold = peak_threshold(looked.background, float(np.max(np.abs(looked.values) ** 2)))
@@ -80,12 +80,7 @@ def _brighter_elsewhere(
     there = np.zeros(sines.shape)
     if real.any():
         ranges = np.broadcast_to(far[:, None], sines.shape)[real]
-        origins = _polar(ranges, sines[real])
+        origins = sector_points(ranges, sines[real])
         there[real] = np.abs(backproject(echo, origins, weights=survey_weights(echo))) ** 2
     lobes: np.ndarray = there.max(axis=1) > LOBE * levels
     return lobes
-
-
-def _polar(ranges: np.ndarray, sines: np.ndarray) -> Float[np.ndarray, "*grid 3"]:
-    x = ranges * sines
-    return np.stack([x, ranges * np.sqrt(1 - sines**2) + 0 * x, 0 * x], axis=-1)

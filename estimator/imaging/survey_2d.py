@@ -73,9 +73,7 @@ def survey(echo: Echo) -> Survey:
     limit = imaged_sine(echo)
     count = 2 * int(np.ceil(limit / (STEP * resolution.across_ray))) + 1
     sines = np.linspace(-limit, limit, count)
-    points = np.zeros((ranges.size, count, 3))
-    points[..., 0] = ranges[:, None] * sines
-    points[..., 1] = ranges[:, None] * np.sqrt(1 - sines**2)
+    points = sector_points(ranges[:, None], sines)
     taper = survey_weights(echo)
     values = backproject(echo, points, weights=taper)
     peaks = significant_peaks(np.abs(values) ** 2, points)
@@ -107,6 +105,14 @@ def survey(echo: Echo) -> Survey:
         as_mirror=by_shape[1],
         background=background,
     )
+
+
+def sector_points(
+    ranges: Float[np.ndarray, "*#grid"], sines: Float[np.ndarray, "*#grid"]
+) -> Float[np.ndarray, "*grid 3"]:
+    """Return places in the plane before a linear array, from ranges [m] and azimuths' sines."""
+    x = ranges * sines
+    return np.stack([x, ranges * np.sqrt(1 - sines**2), np.zeros_like(x)], axis=-1)
 
 
 def _faces(

@@ -84,7 +84,8 @@ def with_diffuse_search(
     diffuse = _placed(answer, fix, seen)
     if answer.status == "found" and (len(fix.rivals) or _confirms(diffuse, answer, walls)):
         return answer
-    if _share(answer) > MOST_ENERGY and not _agreeing(answer, diffuse):
+    agreeing = [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
+    if _share(answer) > MOST_ENERGY and not agreeing:
         if answer.status == "found" and not _far_apart(answer, diffuse, uplink):
             return answer
         return answer if len(fix.rivals) else _against_paths(answer, diffuse)
@@ -97,16 +98,10 @@ def with_diffuse_search(
             reason="what the wall scatters is explained as well by other places",
             alternatives=tuple(_moved(diffuse, rival) for rival in fix.rivals),
         )
-    agreeing = _agreeing(answer, diffuse)
     if len(agreeing) == 1:
         better = agreeing[0] if _spread(agreeing[0]) < _spread(diffuse) else diffuse
         return _among_alike(replace(better, paths=answer.paths), agreeing[0], answer)
     return _weighed(diffuse, fix, seen, answer)
-
-
-def _agreeing(answer: UserEstimate, diffuse: UserEstimate) -> list[UserEstimate]:
-    """Of an answer and its alternatives, those where the diffuse field comes from."""
-    return [one for one in (answer, *answer.alternatives) if _agree(one, diffuse)]
 
 
 def _against_paths(answer: UserEstimate, diffuse: UserEstimate) -> UserEstimate:

@@ -104,7 +104,7 @@ def _decided(
             way = look_along(alone, wave, room, found.how)
         through[number] = through_odds(one, found, room, way.sight)
         ways[number] = way
-        odds[-1] = unseen_odds(one, found, room, way.sight, way.blocked) + through.get(number, 0.0)
+        odds[-1] = unseen_odds(one, found, room, way.sight, way.blocked) + through[number]
     weights = np.exp(np.array(logs) - max(logs))
     total = float((weights * (1 + np.array(odds))).sum())
     places = _places(consistent, weights / total, found.how)

@@ -29,7 +29,7 @@ from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolutio
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.peak_detection import mean_background
-from estimator.imaging.survey_2d import STEP
+from estimator.imaging.survey_2d import STEP, sector_points
 from estimator.measurement.model import Echo
 from estimator.walls.scatterer_row import (
     adjoint,
@@ -116,8 +116,7 @@ def _all_around(
     ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)[:, None]
     count = 2 * int(np.ceil(WIDEST_SINE / (STEP * resolution.across_ray))) + 1
     sines = np.linspace(-WIDEST_SINE, WIDEST_SINE, count)
-    x = ranges * sines
-    return np.stack([x, ranges * np.sqrt(1 - sines**2), np.zeros_like(x)], axis=-1), sines
+    return sector_points(ranges, sines), sines
 
 
 def _source_echo(

@@ -57,16 +57,11 @@ def length_slopes(
     uplink: Uplink, values: Float[np.ndarray, " parameters"]
 ) -> Float[np.ndarray, "elements parameters"]:
     """Differentiate the length r − R_c + R by (aoa, R[, R_c]), for each element."""
-    aoa, radius = float(values[0]), float(values[-1])
-    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    turned = np.array([-np.sin(aoa), np.cos(aoa), 0.0])
-    reach = radius * towards - uplink.positions
-    reach = reach / np.linalg.norm(reach, axis=-1, keepdims=True)
-    bend = reach @ towards
+    _, along, across = _rays(uplink, values)
     free = len(values) == 3
-    lengths = [radius * (reach @ turned), np.ones_like(bend) if free else bend]
+    lengths = [float(values[-1]) * across, np.ones_like(along) if free else along]
     if free:
-        lengths.append(bend - 1)
+        lengths.append(along - 1)
     return np.stack(lengths, axis=-1)
 
 
@@ -74,17 +69,26 @@ def length_bends(
     uplink: Uplink, values: Float[np.ndarray, " parameters"]
 ) -> Float[np.ndarray, "elements parameters parameters"]:
     """Differentiate the length r − R_c + R twice by (aoa, R[, R_c]), for each element."""
-    aoa, radius = float(values[0]), float(values[-1])
-    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
-    turned = np.array([-np.sin(aoa), np.cos(aoa), 0.0])
-    reach = radius * towards - uplink.positions
-    distance = np.linalg.norm(reach, axis=-1)
-    along, across = reach @ towards / distance, reach @ turned / distance
+    radius = float(values[-1])
+    distance, along, across = _rays(uplink, values)
     bends = np.zeros((len(distance), len(values), len(values)))
     bends[:, 0, 0] = radius**2 * (1 - across**2) / distance - radius * along
     bends[:, 0, -1] = bends[:, -1, 0] = across - radius * along * across / distance
     bends[:, -1, -1] = (1 - along**2) / distance
     return bends
+
+
+def _rays(
+    uplink: Uplink, values: Float[np.ndarray, " parameters"]
+) -> tuple[Float[np.ndarray, " elements"], ...]:
+    """Return elements' distances from the source [m], and their rays along and across the axis."""
+    aoa = float(values[0])
+    towards = np.array([np.cos(aoa), np.sin(aoa), 0.0])
+    turned = np.array([-np.sin(aoa), np.cos(aoa), 0.0])
+    reach = float(values[-1]) * towards - uplink.positions
+    distance = np.linalg.norm(reach, axis=-1)
+    rays = reach / distance[:, None]
+    return distance, rays @ towards, rays @ turned
 
 
 def curved_part(
