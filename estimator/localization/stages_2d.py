@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +18,7 @@ from estimator.channel.angle_range_map_2d import (
 from estimator.channel.path_extraction_2d import find_paths
 from estimator.geometry.lateness import combined
 from estimator.imaging.look_aside_2d import peaks_aside
+from estimator.imaging.point_levels import point_levels_db
 from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes, range_notes
 from estimator.localization.close_range import close_scene
@@ -64,6 +65,7 @@ class LinearRoom:
             contrast=self.map.contrast,
             late=combined([line.late for line in self.map.lines if line.late is not None]),
             aside=self._aside,
+            levels=partial(point_levels_db, self.echo),
         )
 
     def _aside(

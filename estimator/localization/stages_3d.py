@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +18,7 @@ from estimator.array.viewpoint import Viewpoint
 from estimator.channel.angle_range_map_3d import direction_map
 from estimator.channel.path import LEAST_SHARE
 from estimator.channel.path_extraction_3d import find_space_paths
+from estimator.imaging.point_levels import point_levels_db
 from estimator.localization.aliasing import aliasing_notes
 from estimator.localization.close_range import close_scene, too_large
 from estimator.localization.constant_room import RoomBehindConstant
@@ -70,6 +71,7 @@ class PlanarRoom:
             aside=lambda heading, farthest: peaks_aside(
                 self.echo, self.array, self.map, heading, farthest
             ),
+            levels=partial(point_levels_db, self.echo),
         )
 
     @property

@@ -73,8 +73,8 @@ def unseen_mirrors(
     unassigned_peaks: Float[np.ndarray, "peaks 3"],
     resolution: Resolution,
     how: Bearing,
-) -> list[FlatWall]:
-    """Return the walls between two peaks on no wall that the ray meets before its end.
+) -> list[tuple[FlatWall, Float[np.ndarray, "2 3"]]]:
+    """Return the walls between two peaks on no wall that the ray meets before its end, and those.
 
     Parameters
     ----------
@@ -87,12 +87,13 @@ def unseen_mirrors(
     how
         What the array measures of a direction.
     """
-    points, met = unassigned_peaks, []
+    points = unassigned_peaks
+    met: list[tuple[FlatWall, Float[np.ndarray, "2 3"]]] = []
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         wall = wall_between(points[first], points[second], resolution, how)
         hit = None if wall is None else wall.hit(np.zeros(3), heading)
         if wall is not None and hit is not None and hit[0] < path_length:
-            met.append(wall)
+            met.append((wall, points[[first, second]]))
     return met
 
 

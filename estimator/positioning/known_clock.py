@@ -101,10 +101,10 @@ def _decided(
         if only.chain:
             way = look_along_legs(alone, wave, only.chain, room, found.how)
         else:
-            way = look_along(alone, wave, room, found.how)
+            way = look_along(alone, wave, room, found.how, found.frequency)
         through[number] = through_odds(one, found, room, way.sight)
         ways[number] = way
-        odds[-1] = unseen_odds(one, found, room, way.sight, way.blocked) + through[number]
+        odds[-1] = unseen_odds(one, found, room, way) + through[number]
     weights = np.exp(np.array(logs) - max(logs))
     total = float((weights * (1 + np.array(odds))).sum())
     places = _places(consistent, weights / total, found.how)

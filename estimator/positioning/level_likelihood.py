@@ -101,6 +101,7 @@ def level_density(
     first: bool = True,
     blocked: float = BLOCKED,
     tilted: float = 1.0,
+    smooth: float = 1.0,
 ) -> float:
     """Return the density of an excess, and of its tilt over a direct path's. [1/dB].
 
@@ -117,6 +118,8 @@ def level_density(
     tilted
         How much likelier the path's tilt is of a reflected wave than of a direct one; a conductor
         without loss tilts nothing. [-]
+    smooth
+        How much likelier what else is known is of such conductors than of none. [-]
     """
     seen = blocked if first and reflections else 1.0
     deviation = sqrt(LEVEL_DEVIATION_DB**2 + reflections * ASSUMED_DEVIATION_DB**2)
@@ -125,6 +128,7 @@ def level_density(
     lossless = exp(-0.5 * (excess / LEVEL_DEVIATION_DB) ** 2) / (sqrt(2 * pi) * LEVEL_DEVIATION_DB)
     metal = SMOOTH_METAL**reflections
     lossy = (1 - metal) * (tilted if reflections else 1.0)
+    metal *= smooth
     aimed = (1 - ISOTROPIC) / (MOST_DB - LEAST_DB)
     return ISOTROPIC * seen * (lossy * normal + metal * lossless) + aimed * (lossy + metal)
 

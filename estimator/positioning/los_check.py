@@ -5,6 +5,7 @@ short one shows as a few peaks without a direction; in an echo that is nearly al
 shows. The user's pilot alone cannot distinguish the user from its image in such a mirror.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -27,6 +28,7 @@ from estimator.positioning.blockage import (
     unseen_mirrors,
     what_stands_in_the_way,
 )
+from estimator.positioning.edge_evidence import UNTOLD, EdgeOdds, odds_of_edges
 from estimator.positioning.level_likelihood import BLOCKED
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.unseen_mirrors import wall_behind, wall_between
@@ -59,9 +61,16 @@ class StraightWay:
     doubt: str | None  # why something may be on it, for a person to read; None if it is clear
     otherwise: UserEstimate | None = None  # where the user is over a mirror between two points
     blocked: float = BLOCKED  # probability that something blocks the straight way to there [-]
+    edges: EdgeOdds = UNTOLD  # whether such points are as bright as a mirror's ends
 
 
-def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing) -> StraightWay:
+def look_along(
+    answer: UserEstimate,
+    wave: Wave,
+    room: MapContext,
+    how: Bearing,
+    frequency: float | None = None,
+) -> StraightWay:
     """Look for mirrors that the map does not show on the straight line from the array to a user.
 
     Parameters
@@ -74,6 +83,8 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
         What the image shows.
     how
         What the array measures of a direction.
+    frequency
+        Centre of the band, None if unknown. [Hz]
     """
     heading, length = how.towards(wave.bearing), wave.path_length
     shown = room.shows(heading)
@@ -86,7 +97,7 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
             peaks, shown, sight = [aside, *peaks], True, "clear aside"
     loose = np.concatenate([some[:LOOSE_PEAKS] for some in peaks])
     mirrors = unseen_mirrors(heading, length, loose, room.resolution, how)
-    others = [_over_one_more(answer, wave, (), mirror, room, how) for mirror in mirrors]
+    others = [_over_one_more(answer, wave, (), mirror, room, how) for mirror, _ in mirrors]
     if others:
         chances = [
             chance_of_blockage(other.position, room, how)
@@ -100,6 +111,7 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
             "smooth to be seen; over such a wall the user is elsewhere",
             otherwise=other,
             blocked=blocked,
+            edges=_as_edges([edges for _, edges in mirrors], room, frequency),
         )
     thing = what_stands_in_the_way(
         heading, length, np.concatenate(peaks), room.resolution.across_ray
@@ -127,6 +139,22 @@ def look_along(answer: UserEstimate, wave: Wave, room: MapContext, how: Bearing)
             f"{np.degrees(np.arcsin(room.widest)):.1f}° of boresight",
         )
     return StraightWay(sight=sight, doubt=None)
+
+
+def _as_edges(
+    pairs: Sequence[Float[np.ndarray, "2 3"]], room: MapContext, frequency: float | None
+) -> EdgeOdds:
+    """Return how much likelier pairs' levels are if one of them, any, is a mirror's edges."""
+    if room.levels is None or frequency is None:
+        return UNTOLD
+    levels = room.levels(np.concatenate(pairs)).reshape(-1, 2)
+    odds = [
+        odds_of_edges(edges, level, frequency) for edges, level in zip(pairs, levels, strict=True)
+    ]
+    return EdgeOdds(
+        metal=float(np.mean([one.metal for one in odds])),
+        lossy=float(np.mean([one.lossy for one in odds])),
+    )
 
 
 def look_along_legs(

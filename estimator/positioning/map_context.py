@@ -16,6 +16,9 @@ LookAside = Callable[[Float[np.ndarray, " 3"], float], Float[np.ndarray, "peaks 
 """From a unit vector and a distance [m] to peaks of the echo's image around it [m], strongest
 first; None where there is no image."""
 
+Levels = Callable[[Float[np.ndarray, "points 3"]], Float[np.ndarray, " points"]]
+"""From points [m] to 20 log10 of the S-parameters of point scatterers as bright there [dB]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MapContext:
@@ -35,6 +38,8 @@ class MapContext:
     """By how much the walls' echoes are later than they are curved; None where nothing tells."""
     aside: LookAside | None = None
     """Looks for what stands around a direction that the image does not show, if that can be."""
+    levels: Levels | None = None
+    """How bright the image is at points; None where nothing tells."""
 
     def shows(self, heading: Float[np.ndarray, " 3"]) -> bool:
         """Tell whether the image shows what there is in a direction, a unit vector."""

@@ -35,6 +35,7 @@ from estimator.positioning.level_likelihood import (
     path_excess_db,
     told_excess_db,
 )
+from estimator.positioning.los_check import StraightWay
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.weighted_least_squares import Consensus
 from estimator.prediction.wall_reflection import excess_db
@@ -232,8 +233,7 @@ def unseen_odds(
     explanation: Consensus,
     found: PathSet,
     room: MapContext,
-    sight: Sight,
-    blocked: float = BLOCKED,
+    way: StraightWay,
 ) -> float:
     """Return the odds that a lone path came over one more mirror than it is said to. [-].
 
@@ -243,32 +243,34 @@ def unseen_odds(
         Of the path.
     found, room
         The paths and the map.
-    sight
+    way
         What the image shows of the way on which that mirror would be: the straight way of a direct
         path, the legs beyond the first mirror of one that was reflected.
-    blocked
-        Probability that something blocks the straight way to where the user is over that mirror;
-        used for direct paths. [-]
     """
     (only,) = explanation.sightings
     path = found.paths[only.path]
     more = UNEXPLAINED_UNSEEN if strong_unexplained(explanation, found, room) else 1.0
     excess = level_of(path, found, room)
     if only.chain:
-        odds = FURTHER.get(sight, FURTHER["clear"])
-    elif excess is None and sight in ("clear", "clear aside"):
+        odds = FURTHER.get(way.sight, FURTHER["clear"])
+    elif excess is None and way.sight in ("clear", "clear aside"):
         odds = CLEAR_UNSEEN
     else:
-        odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[sight]
+        odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[way.sight]
     tilted = tilt_ratio(path, found, way="reflected", over="direct")
     if excess is None and not only.chain:
-        odds *= SMOOTH_METAL + (1 - SMOOTH_METAL) * tilted
+        odds *= SMOOTH_METAL * way.edges.metal + (1 - SMOOTH_METAL) * way.edges.lossy * tilted
     if excess is not None:
         bounces = len(only.chain)
         first = arrives_first(path, found, room)
-        hidden = BLOCKED if bounces else blocked
+        hidden = BLOCKED if bounces else way.blocked
         more_mirrors = level_density(
-            excess, bounces + 1, first=first, blocked=hidden, tilted=tilted
+            excess,
+            bounces + 1,
+            first=first,
+            blocked=hidden,
+            tilted=tilted * way.edges.lossy,
+            smooth=way.edges.metal,
         )
         odds *= more_mirrors / level_density(excess, bounces, first=first, tilted=tilted)
     return odds * more

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from scipy.linalg import cho_solve
 
 from estimator.array.resolution_cell import Resolution
+from estimator.array.windows import SURVEY_TAPER, aperture_taper
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_sampling import trial_points
@@ -59,11 +60,13 @@ def examine(echo: Echo, line: FittedLine, resolution: Resolution) -> Evidence:
     resolution
         Of the echo.
     """
+    return Evidence(explained=_explained(echo, line, resolution), depth=depth_of(line, resolution))
+
+
+def depth_of(line: FittedLine, resolution: Resolution) -> float:
+    """Return a line's extent in range. [cells]."""
     ranges = np.linalg.norm([line.start, line.end, _nearest_place(line)], axis=-1)
-    return Evidence(
-        explained=_explained(echo, line, resolution),
-        depth=float(np.ptp(ranges)) / resolution.along_ray,
-    )
+    return float(np.ptp(ranges)) / resolution.along_ray
 
 
 def _nearest_place(line: FittedLine) -> Float[np.ndarray, " 3"]:
@@ -92,8 +95,13 @@ def _explained(echo: Echo, line: FittedLine, resolution: Resolution) -> float:
     across = ASIDE * float(resolution.cell(line.middle, line.normal))
     cells = trial_points(start, end, along, np.zeros(1), across)[0].reshape(-1, 3)
     focused = row_echoes(few, profiles, cells, line.normal)[0]
-    seen, unexplained = (
-        (np.abs(adjoint(focused, values)) ** 2).reshape(across.size, -1).sum(axis=0)
-        for values in (data, left)
-    )
-    return float(np.median(1 - unexplained / seen))
+    shares = []
+    for taper in (np.ones(len(few.positions)), aperture_taper(few.positions, SURVEY_TAPER)):
+        seen, unexplained = (
+            (np.abs(adjoint(focused, (taper[:, None] * values).ravel())) ** 2)
+            .reshape(across.size, -1)
+            .sum(axis=0)
+            for values in (data.reshape(profiles.values.shape), left.reshape(profiles.values.shape))
+        )
+        shares.append(float(np.median(1 - unexplained / seen)))
+    return max(shares)

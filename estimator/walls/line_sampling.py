@@ -87,3 +87,15 @@ def levels(
     on = len(beside) // 2
     around = np.delete(intensity, on, axis=0)
     return float(intensity[on].mean()), mean_background(around)
+
+
+def median_level(
+    focus: Focus,
+    start: Float[np.ndarray, " 3"],
+    end: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+) -> float:
+    """Mean intensity along the line if speckle of one level has this median."""
+    places = places_along(start, end, resolution)
+    points = trial_points(start, end, places, np.zeros(1), np.zeros(1))[0, 0]
+    return mean_background(np.abs(focus(points)) ** 2)

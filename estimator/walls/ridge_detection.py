@@ -29,6 +29,8 @@ thousand cells. [-]"""
 ABOVE_BESIDE = 3.0
 """Intensity over that of either side: of exponential speckle alike on all three, one place in ten
 passes, and hardly :data:`LIT_SHARE` of those on a segment. [-]"""
+RIDGE_LEVEL = -ABOVE_BACKGROUND / float(np.log(LIT_SHARE))
+"""Mean level of speckle over the background from which so many places stand out: 13.5 dB. [-]"""
 ASIDE = 3.0
 """Distance to either side: the survey's main lobe ends at 1.4. [cells]"""
 MOST_ENDS = 160
@@ -60,7 +62,7 @@ def find_ridges(
     along = peaks[second] - peaks[first]
     length = np.linalg.norm(along, axis=-1)
     middle = 0.5 * (peaks[first] + peaks[second])
-    cells = length / _cell(middle, along / np.maximum(length, 1e-9)[:, None], resolution)
+    cells = length / width_of(middle, along / np.maximum(length, 1e-9)[:, None], resolution)
     long = cells >= LEAST_CELLS
     first, second, cells = first[long], second[long], cells[long]
     share = _lit_share(looked, peaks[first], peaks[second], resolution)
@@ -78,7 +80,7 @@ def find_ridges(
     return tuple(found)
 
 
-def _cell(
+def width_of(
     points: Float[np.ndarray, "*n 3"], directions: Float[np.ndarray, "*n 3"], resolution: Resolution
 ) -> Float[np.ndarray, "*n"]:
     """Return the resolution cell at points, each along its own direction. [m]."""
@@ -104,15 +106,17 @@ def _lit_share(
     along = (ends - starts) / np.linalg.norm(ends - starts, axis=-1, keepdims=True)
     normals = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
     normals = np.broadcast_to(normals, places.shape)
-    aside = ASIDE * _cell(places, normals, resolution)[..., None] * normals
-    on, left, right = (_read(looked, intensity, places + shift) for shift in (0, aside, -aside))
+    aside = ASIDE * width_of(places, normals, resolution)[..., None] * normals
+    on, left, right = (
+        intensity_at(looked, intensity, places + shift) for shift in (0, aside, -aside)
+    )
     lit = (on > ABOVE_BACKGROUND * looked.background) & (
         on > ABOVE_BESIDE * np.maximum(left, right)
     )
     return np.asarray(lit.mean(axis=0))
 
 
-def _read(
+def intensity_at(
     looked: Survey,
     intensity: Float[np.ndarray, "ranges sines"],
     points: Float[np.ndarray, "*n 3"],

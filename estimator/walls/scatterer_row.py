@@ -8,8 +8,8 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor
 from scipy.linalg.blas import zherk
 
+from estimator.imaging.dirichlet_kernel import Sweep, point_profiles
 from estimator.measurement.model import Echo, frequency_step
-from estimator.walls.dirichlet_kernel import Sweep, point_profiles
 
 OVERSAMPLING = 1.2
 """Scatterers of the row, over the degrees of freedom of the speckle that the echo can show. Fewer

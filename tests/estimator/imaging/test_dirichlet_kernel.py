@@ -5,7 +5,7 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.walls.dirichlet_kernel import Sweep, point_profiles
+from estimator.imaging.dirichlet_kernel import Sweep, point_profiles
 
 SWEEP = Sweep(centre=275e9, step=20e6, count=401)
 BINS = np.arange(220, 260) * SWEEP.bin_width

@@ -1,0 +1,156 @@
+r"""Lines that no single place of a SAR image shows: their mean stands out of the noise.
+
+The face of a rather smooth wall, or of one that is far off the array's mirror direction, scatters
+little more than the noise: a handful of its cells pass the threshold of single pixels, as a rule
+those of its two ends. The mean over the n cells between the ends stands out by :math:`\sqrt n`
+more. Every pair of local maxima is tried as the ends of such a line. Of each place between them the
+intensity counts over its own background, clipped:
+
+.. math:: x = \min(I / b, c), \qquad \mathrm{E}\,x = 1 - e^{-c}, \quad
+          \mathrm{Var}\,x = 1 - 2 c\,e^{-c} - e^{-2c}
+
+if the place is noise (exponentially distributed with mean b): a few bright places, as where a line
+crosses other things, say nothing of the rest. The background includes the sidelobes in the same
+range and in the same direction: what the survey's taper leaves of the brightest things there, and
+what most places of that range or direction show, as where only a part of the array sees something.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import norm
+
+from estimator import false_alarm
+from estimator.array.resolution_cell import Resolution
+from estimator.imaging.peak_detection import DYNAMIC_RANGE, peaks_above
+from estimator.imaging.survey_2d import Survey
+from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
+from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, intensity_at, width_of
+
+END = 1e-3
+"""False-alarm rate of an end: an image has some dozens of such maxima of noise, and what counts is
+the line between two. [per pixel]"""
+CLIP = 4.0
+"""Largest intensity of a place that counts, over its background. The mean of x then separates a
+level of 3 from one of 1 by as many deviations as any: 2 % less at 3 and at 6. [-]"""
+SAMPLES = 64
+"""Places between two ends; on lines of up to 64 cells there is more than one for each, and these
+count as one. [-]"""
+CUT = 3.0
+"""Distance from either end that is left out: an end is bright, and the survey's lobe ends at 1.4
+cells (:data:`estimator.walls.ridge_detection.ASIDE`). [cells]"""
+LEAST_CELLS = 8.0
+"""Shortest part between: with fewer, only lines that single places show pass. [cells]"""
+MOST_LINES = 8
+"""Lines at which the search ends, as for ridges. [-]"""
+
+
+def find_faint_lines(
+    looked: Survey, known: Sequence[LineCandidate], resolution: Resolution
+) -> tuple[LineCandidate, ...]:
+    """Find the segments between two maxima whose mean stands out; the clearest first.
+
+    Parameters
+    ----------
+    looked
+        The image.
+    known
+        Lines that were found already, of which no part counts.
+    resolution
+        Of the image.
+
+    Returns
+    -------
+    Segments, each with the number of its cells as its inliers; none has an end on another.
+    """
+    over = _over_background(looked)
+    pixels = looked.points.reshape(-1, 3)
+    free = np.ones(over.shape)
+    for line in known:
+        free[on_segment(pixels, line, resolution, tolerance=SKIRT).reshape(over.shape)] = 0.0
+    least = false_alarm.threshold(END)
+    peaks = peaks_above(over, looked.points, least, most=MOST_ENDS)[0]
+    first, second = np.triu_indices(len(peaks), k=1)
+    along = peaks[second] - peaks[first]
+    length = np.linalg.norm(along, axis=-1)
+    middle = 0.5 * (peaks[first] + peaks[second])
+    cells = length / width_of(middle, along / np.maximum(length, 1e-9)[:, None], resolution)
+    long = cells >= LEAST_CELLS + 2 * CUT
+    first, second, cells = first[long], second[long], cells[long]
+    if not first.size:
+        return ()
+    significance = _significance(looked, over, free, peaks[first], peaks[second], cells, resolution)
+    least = float(norm.isf(false_alarm.WALL / first.size))
+    score = np.where(significance >= least, significance, 0.0)
+    found: list[LineCandidate] = []
+    while score.max() > 0 and len(found) < MOST_LINES:
+        best = int(np.argmax(score))
+        line = LineCandidate(
+            start=peaks[first[best]], end=peaks[second[best]], inliers=round(cells[best])
+        )
+        found.append(line)
+        gone = on_segment(peaks, line, resolution, tolerance=SKIRT)
+        gone[[first[best], second[best]]] = True
+        score[gone[first] | gone[second]] = 0.0
+    return tuple(found)
+
+
+def _significance(
+    looked: Survey,
+    over: Float[np.ndarray, "ranges sines"],
+    free: Float[np.ndarray, "ranges sines"],
+    starts: Float[np.ndarray, "pairs 3"],
+    ends: Float[np.ndarray, "pairs 3"],
+    cells: Float[np.ndarray, " pairs"],
+    resolution: Resolution,
+) -> Float[np.ndarray, " pairs"]:
+    """Return by how many deviations of noise segments are brighter than it, and than either side.
+
+    Parameters
+    ----------
+    looked
+        The image.
+    over
+        Its intensity over the background.
+    free
+        1 where no line is known yet, and 0 else.
+    starts, ends
+        Of the segments. [m]
+    cells
+        Their lengths. [cells]
+    resolution
+        Of the image.
+    """
+    cut = (CUT / cells)[:, None]
+    shares = (cut + (1 - 2 * cut) * np.linspace(0, 1, SAMPLES)).T[..., None]
+    places = starts + shares * (ends - starts)
+    along = (ends - starts) / np.linalg.norm(ends - starts, axis=-1, keepdims=True)
+    normals = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
+    normals = np.broadcast_to(normals, places.shape)
+    aside = ASIDE * width_of(places, normals, resolution)[..., None] * normals
+    counts = intensity_at(looked, free, places) > 0.5
+    share = counts.mean(axis=0)
+    on, left, right = (
+        np.sum(np.minimum(intensity_at(looked, over, places + shift), CLIP) * counts, axis=0)
+        / np.maximum(counts.sum(axis=0), 1)
+        for shift in (0, aside, -aside)
+    )
+    independent = np.minimum(cells - 2 * CUT, SAMPLES) * share
+    mean = 1 - np.exp(-CLIP)
+    variance = 1 - 2 * CLIP * np.exp(-CLIP) - np.exp(-2 * CLIP)
+    deviation = np.sqrt(variance / np.maximum(independent, 1.0))
+    above = (on - mean) / deviation
+    beside = (on - np.maximum(left, right)) / (np.sqrt(2) * deviation)
+    return np.where(independent >= LEAST_CELLS, np.minimum(above, beside), 0.0)
+
+
+def _over_background(looked: Survey) -> Float[np.ndarray, "ranges sines"]:
+    """Return the image's intensity over what noise and sidelobes make of each pixel. [-]."""
+    intensity = np.abs(looked.values) ** 2
+    background = np.full(intensity.shape, looked.background)
+    for axis in (0, 1):
+        highest = DYNAMIC_RANGE * intensity.max(axis=axis, keepdims=True)
+        most = np.median(intensity, axis=axis, keepdims=True) / np.log(2)
+        background = np.maximum(background, np.maximum(highest, most))
+    return np.asarray(intensity / background)
