@@ -1,8 +1,9 @@
 """Measurements of the estimator's thresholds on draws of noise, speckle, rough walls and rooms.
 
-Run as ``python -m validation.experiments.thresholds [TABLE ...] [DRAWS]``.
+Run as ``python -m validation.experiments.thresholds [TABLE ...] [DRAWS] [--only CONSTANT ...]``;
+with ``--only BLOCKED --only USUAL`` the tables of scans hold these constants alone.
 
-Not in the thesis, whose walls are marked by hand. Seven tables:
+Not in the thesis, whose walls are marked by hand. Eight tables:
 
 - ``chance``: false-alarm rates and false detections by noise and random peaks
   (:mod:`validation.trials.chance_finds`);
@@ -16,15 +17,16 @@ Not in the thesis, whose walls are marked by hand. Seven tables:
 - ``decisions``: the same for constants that decide on users alone, each room mapped once;
 - ``images``: targets at scatterers and false ones in scans in closed form, of points, letters and
   soil, with a linear and a planar array (:mod:`validation.trials.measured_scans`);
-- ``space``: as ``answers`` in rooms in space (the set ``space`` of random rooms, those for tuning).
+- ``space``: as ``answers`` in rooms in space (the set ``space`` of random rooms, those for tuning);
+- ``lists``: the same for priors of path lists (:mod:`validation.trials.list_answers`).
 
 Claims that are asserted: each threshold does what its docstring states, within the limits in the
 table; and no scan's own value gives fewer right answers, or more false ones, than a neighbour.
 """
 
-import importlib
+import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -37,17 +39,25 @@ from validation.harness.claim import Row
 from validation.harness.row_table import conclude
 from validation.metrics.truth import truth_from_dataset
 from validation.random_rooms.prior import SEEDS, draw_room
+from validation.trials.answer_scans import label, only_named, scanned_rows
 from validation.trials.chance_finds import chance_rows
 from validation.trials.constant_scans import (
     ANSWER_SCANS,
     DECISION_SCANS,
     DECISIONS,
     IMAGE_SCANS,
+    LIST_SCANS,
     RIVAL_SCAN,
     SPACE_SCANS,
     Scan,
 )
 from validation.trials.drawn_echoes import Kind
+from validation.trials.list_answers import (
+    drawn_lists,
+    list_answers,
+    listed_orders,
+    unlisted_alone,
+)
 from validation.trials.measured_scans import KINDS, DrawnScan, drawn_scan
 from validation.trials.room_answers import (
     DIFFUSE,
@@ -74,7 +84,7 @@ from validation.trials.wall_statistics import (
     wall_statistics,
 )
 
-TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space")
+TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space", "lists")
 DRAWS = 12
 """Walls of each family. [-]"""
 ROOM_SEEDS = 1
@@ -83,6 +93,8 @@ SCAN_SEEDS = 3
 """Scans of each kind and array: of seeds below 1000, which are for tuning. [-]"""
 SPACE_ROOMS = 2
 """Rooms in space. [-]"""
+LIST_ROOMS = 2
+"""Rooms of each kind with path lists, in the plane and in space. [-]"""
 SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
 """Echoes on which constants are scanned, besides one simulated wall of each family. [-]"""
 
@@ -119,6 +131,11 @@ SCANS = (
     Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CELLS", values=(6.0, 12.0)),
     Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
 )
+EVERY_SCAN: tuple[Sequence[Scan], ...] = (
+    SCANS, ANSWER_SCANS, (RIVAL_SCAN,), DECISION_SCANS, IMAGE_SCANS, SPACE_SCANS,
+    LIST_SCANS,
+)  # fmt: skip
+"""All scans, by table."""
 
 
 def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
@@ -263,64 +280,35 @@ def scan_row(one: Scan, results: dict[float, Detection]) -> Row:
     )
 
 
-def answer_scan(
-    one: Scan, answered: Callable[[], Answers], known: Answers | None = None
-) -> dict[float, Answers]:
-    """Count answers with a constant's own value, unless known, and with the neighbouring ones."""
-    own = getattr(importlib.import_module(one.module), one.name)
-    results = {}
-    for value in sorted({own, *one.values}):
-        if known is not None and value == own:
-            results[value] = known
-            continue
-        with changed(one.module, one.name, type(own)(value)):
-            results[value] = answered()
-    return results
-
-
-def scanned_rows(scans: Sequence[Scan], answered: Callable[[], Answers]) -> list[Row]:
-    """Scan constants on the same rooms: their own values are tried once for all."""
-    known = answered()
-    rows = []
-    for one in scans:
-        told = answer_scan(one, answered, known)
-        print(answer_line(one, told), flush=True)
-        rows.append(answer_row(one, told))
-    return rows
-
-
-def answer_line(one: Scan, results: dict[float, Answers]) -> str:
-    """Return the line of a scan of answers; the constant's own value is in brackets."""
-    own = getattr(sys.modules[one.module], one.name)
-    parts = []
-    for value, result in results.items():
-        label = f"[{value:g}]" if value == own else f"{value:g}"
-        parts.append(
-            f"{label}: users {result.right} right, {result.wrong} wrong "
-            f"({1e3 * result.median_error:.3f} mm), walls {result.walls}, "
-            f"{result.false_walls} false, targets {result.targets}, {result.false_targets} false"
-        )
-    return f"{one.module.removeprefix('estimator.')}.{one.name}: " + "; ".join(parts)
-
-
-def answer_row(one: Scan, results: dict[float, Answers]) -> Row:
-    """Return by how many answers the constant's own value is behind the best neighbour."""
-    own = getattr(sys.modules[one.module], one.name)
-    best = max(result.merit for result in results.values())
-    module = one.module.removeprefix("estimator.")
-    return Row(
-        name=f"{module}.{one.name}: right less false answers, behind",
-        stated="none of its neighbours is better by more than one answer",
-        measured=float(best - results[own].merit),
-        high=1.0,
-        origin="one answer of the draws: the scatter of a count",
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse the command line: ``tables``, ``draws`` and ``only``."""
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.experiments.thresholds", description=__doc__.partition("\n")[0]
     )
+    parser.add_argument(
+        "given", nargs="*", metavar="TABLE|DRAWS", help=f"tables: {', '.join(TABLES)}"
+    )
+    parser.add_argument(
+        "--only", action="append", default=[], metavar="NAME",
+        help="scan this constant only, e.g. BLOCKED; may be repeated",
+    )  # fmt: skip
+    options = parser.parse_args(arguments)
+    options.tables = [one for one in options.given if not one.isdigit()] or list(TABLES)
+    options.draws = next((int(one) for one in options.given if one.isdigit()), DRAWS)
+    for one in options.tables:
+        if one not in TABLES:
+            parser.error(f"table {one!r} is none of {', '.join(TABLES)}")
+    for name in options.only:
+        if not any(only_named(scans, [name]) for scans in EVERY_SCAN):
+            known = sorted({label(one) for scans in EVERY_SCAN for one in scans})
+            parser.error(f"--only {name}: no constant that is scanned; choose {', '.join(known)}")
+    return options
 
 
 def main(arguments: list[str]) -> None:
     """Print the requested tables; fail if a threshold does not do what its docstring states."""
-    wanted = [one for one in arguments if not one.isdigit()] or list(TABLES)
-    draws = next((int(one) for one in arguments if one.isdigit()), DRAWS)
+    options = parsed(arguments)
+    wanted, draws = options.tables, options.draws
     rows: list[Row] = []
     if "chance" in wanted:
         rows += chance_rows(np.random.default_rng(0))
@@ -334,43 +322,52 @@ def main(arguments: list[str]) -> None:
                 [wall_statistics(simulated_wall(overrides, seed)) for seed in range(draws)],
             )
             print(f"measured: {name}", file=sys.stderr, flush=True)
-    if "scans" in wanted:
+    if "scans" in wanted and (scans := only_named(SCANS, options.only)):
         echoes = surveyed(SCENES, 1)
         echoes += tuple(simulated_wall(overrides, 100) for overrides in WALLS.values())
-        for one in SCANS:
+        for one in scans:
             results = scan(one, echoes)
             print(scan_line(one, results), flush=True)
             rows.append(scan_row(one, results))
     if "answers" in wanted:
-        simulated: dict[tuple[str, int], SimulatedRoom] = {}
-        for one in ANSWER_SCANS:
-            keys = [(name, seed) for name in one.rooms for seed in range(ROOM_SEEDS)]
-            for key in keys:
-                if key not in simulated:
-                    simulated[key] = simulated_room(*key)
-            told = answer_scan(one, partial(answers, [simulated[key] for key in keys]))
-            print(answer_line(one, told), flush=True)
-            rows.append(answer_row(one, told))
-        pilots = [rough_pilot(*wall, seed) for wall in DIFFUSE for seed in range(DIFFUSE_SEEDS)]
-        told = answer_scan(RIVAL_SCAN, partial(diffuse_answers, pilots))
-        print(answer_line(RIVAL_SCAN, told), flush=True)
-        rows.append(answer_row(RIVAL_SCAN, told))
-    if "decisions" in wanted:
+        rows += answers_rows(only_named(ANSWER_SCANS, options.only))
+        if only_named([RIVAL_SCAN], options.only):
+            pilots = [rough_pilot(*wall, seed) for wall in DIFFUSE for seed in range(DIFFUSE_SEEDS)]
+            rows += scanned_rows([RIVAL_SCAN], partial(diffuse_answers, pilots))
+    if "decisions" in wanted and (scans := only_named(DECISION_SCANS, options.only)):
         placed = [simulated_room(name, 0) for name in DECISIONS]
         with each_mapped_once():
-            rows += scanned_rows(DECISION_SCANS, partial(answers, placed))
-    if "images" in wanted:
+            rows += scanned_rows(scans, partial(answers, placed))
+    if "images" in wanted and (scans := only_named(IMAGE_SCANS, options.only)):
         scanned = [
             drawn_scan(kind, np.random.default_rng([seed, number, planar]), planar=bool(planar))
             for seed in range(SCAN_SEEDS)
             for number, kind in enumerate(KINDS)
             for planar in (0, 1)
         ]
-        rows += scanned_rows(IMAGE_SCANS, partial(scan_answers, scanned))
-    if "space" in wanted:
+        rows += scanned_rows(scans, partial(scan_answers, scanned))
+    if "space" in wanted and (scans := only_named(SPACE_SCANS, options.only)):
         spaces = [space_room(number) for number in range(SPACE_ROOMS)]
-        rows += scanned_rows(SPACE_SCANS, partial(answers, spaces))
+        rows += scanned_rows(scans, partial(answers, spaces))
+    if "lists" in wanted and (scans := only_named(LIST_SCANS, options.only)):
+        walked = drawn_lists(LIST_ROOMS)
+        print(f"listed paths over 0 to 3 walls: {np.round(listed_orders(walked), 2)}")
+        print(f"second walls of pairs that are not listed alone: {unlisted_alone(walked):.2f}")
+        rows += scanned_rows(scans, partial(list_answers, walked))
     conclude(rows)
+
+
+def answers_rows(scans: Sequence[Scan]) -> list[Row]:
+    """Scan constants of whole answers, each on its own rooms, which are simulated once."""
+    simulated: dict[tuple[str, int], SimulatedRoom] = {}
+    rows = []
+    for one in scans:
+        keys = [(name, seed) for name in one.rooms for seed in range(ROOM_SEEDS)]
+        for key in keys:
+            if key not in simulated:
+                simulated[key] = simulated_room(*key)
+        rows += scanned_rows([one], partial(answers, [simulated[key] for key in keys]))
+    return rows
 
 
 if __name__ == "__main__":

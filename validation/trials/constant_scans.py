@@ -17,7 +17,7 @@ class Scan:
 
     module: str
     name: str
-    values: tuple[float, float]
+    values: tuple[float, float] | tuple[tuple[float, ...], tuple[float, ...]]
     rooms: tuple[str, ...] = ()  # keys of :data:`validation.trials.trap_rooms.TRAPS`
 
 
@@ -113,3 +113,12 @@ SPACE_SCANS = (
     Scan(module="estimator.mapping.map_3d", name="MOST_TARGETS", values=(12.0, 48.0)),
 )
 """Constants of walls and targets in space, with half and twice their value."""
+
+LIST_SCANS = (
+    Scan(module="estimator.path_consensus.consensus", name="UNSEEN_TOO", values=(0.25, 0.75)),
+    Scan(module="estimator.path_consensus.consensus", name="BY_CHANCE", values=(0.025, 0.1)),
+    Scan(module="estimator.path_consensus.explanations", name="BY_ORDER",
+         values=((0.25, 0.25, 0.25, 0.25), (0.4, 0.3, 0.2, 0.1))),
+)  # fmt: skip
+"""Priors of path lists; of :data:`estimator.path_consensus.explanations.BY_ORDER` another order and
+none at all."""

@@ -37,6 +37,7 @@ class DrawnPaths:
     lists: tuple[PathList, ...]
     users: Float[np.ndarray, "places 3"]  # [m]
     direct: tuple[bool, ...]  # whether each list holds the direct path
+    chains: tuple[tuple[tuple[int, ...], ...], ...]  # walls of each list's paths; −1: from anywhere
     normals: Float[np.ndarray, "walls 3"]  # away from the base station
     offsets: Float[np.ndarray, " walls"]  # [m]
     clock_offset: float  # of the user: delays seem shorter by it [s]
@@ -99,7 +100,7 @@ def drawn_paths(
     only = int(rng.integers(count)) if kind == "mirrored" else None
     frequency = 60e9
     wavelength = speed_of_light / frequency
-    lists, kept, direct = [], [], []
+    lists, kept, direct, listed = [], [], [], []
     for number, user in enumerate(users):
         points, levels, chains = [], [], []
         for chain in _chains(len(normals)):
@@ -146,6 +147,7 @@ def drawn_paths(
         )
         kept.append(user)
         direct.append(any(not chains[i] for i in order))
+        listed.append(tuple(chains[i] for i in order))
     if len(lists) < 3:
         return drawn_paths(
             rng,
@@ -160,6 +162,7 @@ def drawn_paths(
         lists=tuple(lists),
         users=np.array(kept),
         direct=tuple(direct),
+        chains=tuple(listed),
         normals=normals,
         offsets=offsets,
         clock_offset=clock_offset,

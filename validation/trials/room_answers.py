@@ -5,9 +5,10 @@ has its own ones, in which their decisions occur. For the search by diffuse scat
 whole estimate seldom needs, it is run by itself, with the true wall.
 """
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from unittest.mock import patch
 
 import numpy as np
@@ -21,6 +22,7 @@ from estimator.localization.stages_2d import LinearStages
 from estimator.measurement.model import Echo, Measurement, Uplink
 from estimator.positioning.diffuse_positioning import search_diffuse
 from estimator.positioning.wall_anchors import SeenWall
+from estimator.results.estimate import Mirror, Target, UserEstimate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.metrics.coverage import normalised_square, position_errors
@@ -75,6 +77,9 @@ class Answers:
     false_walls: int  # mirrors reported on no wall
     targets: int  # reported
     false_targets: int  # reported where nothing is
+    told: tuple[str, ...] = field(
+        default=(), repr=False
+    )  # everything that was answered, for each room
 
     @property
     def merit(self) -> int:
@@ -110,9 +115,11 @@ def each_mapped_once() -> Iterator[None]:
 def answers(rooms: Sequence[SimulatedRoom]) -> Answers:
     """Locate the users of rooms, and count what is right and what is wrong."""
     errors: list[float] = []
+    told = []
     right = wrong = walls = false_walls = targets = false_targets = 0
     for room in rooms:
         estimate = locate(room.measurement, images=False)
+        told.append(told_by(estimate.users, estimate.mirrors, estimate.targets))
         (user,) = estimate.users
         error, square = position_errors(user, room.truth.user_position[user.name])
         if user.status == "found" and error is not None:
@@ -133,7 +140,17 @@ def answers(rooms: Sequence[SimulatedRoom]) -> Answers:
         false_walls=false_walls,
         targets=targets,
         false_targets=false_targets,
+        told=tuple(told),
     )
+
+
+def told_by(
+    users: Sequence[UserEstimate], mirrors: Sequence[Mirror], targets: Sequence[Target] = ()
+) -> str:
+    """Write users, mirrors and targets out in full, so that answers differ if anything does."""
+    parts = [asdict(one) for one in (*users, *mirrors, *targets)]
+    with np.printoptions(precision=17, threshold=sys.maxsize):
+        return repr(parts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,9 +184,11 @@ def rough_pilot(angle_deg: float, rms_mm: float, seed: int) -> RoughPilot:
 def diffuse_answers(pilots: Sequence[RoughPilot]) -> Answers:
     """Search users by diffuse scattering alone; found are those without rival positions."""
     errors: list[float] = []
+    told = []
     right = 0
     for one in pilots:
         fix = search_diffuse(one.uplink, [SeenWall(seen=one.wall, true=one.wall, through=())])
+        told.append("" if fix is None else repr([fix.position.tolist(), fix.rivals.tolist()]))
         if fix is None or len(fix.rivals):
             continue
         error = (fix.position - one.position)[:2]
@@ -183,4 +202,5 @@ def diffuse_answers(pilots: Sequence[RoughPilot]) -> Answers:
         false_walls=0,
         targets=0,
         false_targets=0,
+        told=tuple(told),
     )

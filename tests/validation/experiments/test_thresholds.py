@@ -8,23 +8,20 @@ import pytest
 
 from estimator.walls import line_relations
 from validation.experiments.thresholds import (
+    EVERY_SCAN,
     SCANS,
-    answer_row,
     overlap_rows,
+    parsed,
     scan,
     scan_row,
     wall_rows,
 )
 from validation.trials import chance_finds
-from validation.trials.constant_scans import (
-    ANSWER_SCANS,
-    DECISION_SCANS,
-    IMAGE_SCANS,
-    RIVAL_SCAN,
-    SPACE_SCANS,
-    Scan,
-)
+from validation.trials.answer_scans import answer_line, answer_row, label, only_named
+from validation.trials.constant_scans import ANSWER_SCANS, DECISION_SCANS, RIVAL_SCAN, Scan
 from validation.trials.drawn_echoes import draw_echo
+from validation.trials.list_answers import list_answers, listed_orders, unlisted_alone
+from validation.trials.path_lists import SounderErrors, drawn_paths
 from validation.trials.room_answers import answers, diffuse_answers, rough_pilot, simulated_room
 from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
 
@@ -83,14 +80,56 @@ def test_a_constant_is_changed_wherever_it_is_imported() -> None:
 
 @pytest.mark.parametrize(
     "one",
-    [*SCANS, *ANSWER_SCANS, *DECISION_SCANS, *IMAGE_SCANS, *SPACE_SCANS, RIVAL_SCAN],
-    ids=lambda one: f"{one.module.rpartition('.')[2]}.{one.name}",
+    [one for scans in EVERY_SCAN for one in scans],
+    ids=label,
 )
 def test_each_scan_is_of_a_constant_that_exists_between_the_values_tried(one: Scan) -> None:
     low, high = one.values
     module = importlib.import_module(one.module)
     own = getattr(module, one.name)
     assert low < own < high
+
+
+def test_a_table_of_scans_holds_the_constants_that_are_asked_for_alone() -> None:
+    options = parsed(["decisions", "--only", "BLOCKED", "--only", "posterior.USUAL"])
+    scans = only_named(DECISION_SCANS, options.only)
+    assert [label(one) for one in scans] == ["posterior.USUAL", "level_likelihood.BLOCKED"]
+    assert only_named(DECISION_SCANS, parsed(["3"]).only) == DECISION_SCANS
+
+
+def test_a_constant_or_a_table_that_is_not_there_is_refused_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for arguments in (["--only", "BLOKED"], ["decsions"]):
+        with pytest.raises(SystemExit):
+            parsed(arguments)
+    told = capsys.readouterr().err
+    assert "--only BLOKED: no constant that is scanned; choose" in told
+    assert "level_likelihood.BLOCKED" in told
+    assert "table 'decsions' is none of chance, walls" in told
+
+
+def test_path_lists_give_right_users_and_none_where_paths_agree_by_chance_for_sure() -> None:
+    exact = SounderErrors(
+        angle=np.radians(0.5), delay=0.05e-9, level_db=0.5, missed=0.0, scattered=0.0
+    )
+    whole = drawn_paths(np.random.default_rng(7001), "open", space=False, errors=exact)
+    room = replace(
+        whole,
+        **{name: getattr(whole, name)[:6] for name in ("lists", "users", "direct", "chains")},
+    )
+    orders = listed_orders([room])
+    assert orders[0] == len(room.lists) / sum(one.delay.size for one in room.lists)
+    assert orders.sum() == pytest.approx(1)
+    assert 0 <= unlisted_alone([room]) < 0.5
+    seen = list_answers([room])
+    assert (seen.right, seen.wrong, seen.false_walls) == (len(room.lists), 0, 0)
+    (one,) = (scan for scans in EVERY_SCAN for scan in scans if scan.name == "BY_CHANCE")
+    with changed(one.module, one.name, 1e300):
+        lost = list_answers([room])
+    assert lost.right == 0
+    own = getattr(importlib.import_module(one.module), one.name)
+    assert "differs in 1 of 1" in answer_line(one, {own: seen, 1e300: lost})
 
 
 def test_a_user_in_sight_is_a_right_answer_and_is_lost_where_no_path_may_count() -> None:
