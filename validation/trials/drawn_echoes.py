@@ -65,7 +65,7 @@ def draw_echo(kind: Kind, rng: np.random.Generator) -> DrawnEcho:
         distance = rng.uniform(0.3, 0.6, 6)
         points = np.stack([distance * np.sin(azimuth), distance * np.cos(azimuth), 0 * azimuth], -1)
     elif kind != "noise":
-        walls.append(_draw_wall(rng))
+        walls.append(draw_wall(rng))
         if kind == "corner":
             walls.append(_joined(walls[0], rng))
         points = np.concatenate([_row(wall, rng) for wall in walls])
@@ -86,7 +86,8 @@ def draw_echo(kind: Kind, rng: np.random.Generator) -> DrawnEcho:
     return DrawnEcho(kind=kind, echo=echo, walls=tuple(walls))
 
 
-def _draw_wall(rng: np.random.Generator) -> Segment:
+def draw_wall(rng: np.random.Generator) -> Segment:
+    """Draw the ends of a wall; see :func:`draw_echo`. [m]."""
     azimuth, distance = np.radians(rng.uniform(-20, 20)), rng.uniform(0.3, 0.6)
     middle = distance * np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
     turn, half = np.radians(rng.uniform(-60, 60)) - azimuth, 0.5 * rng.uniform(0.12, 0.25)

@@ -20,7 +20,7 @@ from estimator.walls.wall_detection_2d import (
     unassigned_peaks,
 )
 
-WALLS = 12
+WALLS = 8
 
 
 def found(echo: Echo) -> tuple[FittedLine, ...]:

@@ -128,7 +128,7 @@ def numeric_fisher(*, free: bool) -> Float[np.ndarray, "parameters parameters"]:
     return np.asarray(2 * np.real(jacobian.conj().T @ jacobian))
 
 
-TRIALS = 300
+TRIALS = 150
 """The relative deviation of a variance from n trials is √(2/n): 8 %; four of them are 33 %."""
 
 NOISE = 0.05  # standard deviation of each sample: 17 dB below the wave
@@ -161,7 +161,7 @@ def test_the_scatter_comes_down_to_the_cramer_rao_bound(
     bound = NOISE**2 * np.linalg.inv(numeric_fisher(free=free))[:size, :size]
     errors = answers(waves, free=free) - np.array([1.3, 0.6, 0.6])[:size]
     scatter = errors.T @ errors / TRIALS
-    # In the bound's own axes, each direction is a variance of 300 trials, of expectation 1.
+    # In the bound's own axes, each direction is a variance of 150 trials, of expectation 1.
     white = np.linalg.inv(np.linalg.cholesky(bound))
     spread = np.linalg.eigvalsh(white @ scatter @ white.T)
     assert np.all(np.abs(spread - 1) <= 4 * np.sqrt(2 / TRIALS)), spread

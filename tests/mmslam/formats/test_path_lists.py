@@ -103,7 +103,8 @@ def test_columns_of_other_sizes_are_refused(tmp_path: Path, take: Take) -> None:
 def test_a_list_goes_through_the_file_and_is_located_with_pictures(tmp_path: Path) -> None:
     drawn = drawn_paths(np.random.default_rng(7001), "open", space=True)
     rows = ["spot,az,el,tau,p"]
-    for number, one in enumerate(drawn.lists):
+    walk = drawn.lists[:8]
+    for number, one in enumerate(walk):
         assert one.elevation is not None
         assert one.gain_db is not None
         columns = (one.azimuth, one.elevation, 1e9 * one.delay, one.gain_db)
@@ -115,13 +116,13 @@ def test_a_list_goes_through_the_file_and_is_located_with_pictures(tmp_path: Pat
     import_to_file(tmp_path / "walk.csv", mapping=tmp_path / "walk.toml", uplink=None, path=store)
     again = read(store).path_lists
     np.testing.assert_allclose(again[0].delay, drawn.lists[0].delay, atol=1e-15)
-    assert len(again) == len(drawn.lists)
+    assert len(again) == len(walk)
     assert "paths of" in repr(read(store))
     outcome = locate_measurement(store, sample=None, folder=tmp_path / "out")
     result = json.loads((outcome.folder / "result.json").read_text())
     assert result["dimensions"] == 3
     found = [user for user in result["users"] if user["status"] == "found"]
-    assert len(found) > 0.8 * len(drawn.lists)
+    assert len(found) > 0.8 * len(walk)
     assert result["mirrors"][0]["level_db"] is None
     assert (outcome.folder / "localization.png").stat().st_size > 10_000
 

@@ -141,6 +141,6 @@ def room(folder: Path, cuts: int, shift: float = 0.0) -> np.ndarray:
 
 def test_a_room_sounds_the_same_however_it_is_cut_and_wherever_it_stands(tmp_path: Path) -> None:
     coarse = room(tmp_path, 0)
-    for other in (room(tmp_path, 2), room(tmp_path, 0, shift=400.0)):
+    for other in (room(tmp_path, 1), room(tmp_path, 0, shift=400.0)):
         # Facets and single precision of what the ray tracer is given.
         assert np.abs(other - coarse).max() < 1e-3 * np.abs(coarse).max()
