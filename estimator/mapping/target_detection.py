@@ -48,7 +48,10 @@ ONE_PLACE = 2.0
 """Distance within which peaks are one or on one ray's or arc's sidelobes, and targets are one or on
 a wall: the survey's main lobe ends at 1.4, and a place is off by half a cell. [cells]"""
 WINDOW = 40
-"""Half the side of the neighbourhood of a peak, for time. Chosen, not measured. [pixels]"""
+"""Half the side of the neighbourhood of a peak, for time: 20 of the survey's cells to either side,
+where what is straight and longer than 8 is a wall
+(:data:`estimator.walls.wall_detection_2d.LEAST_CELLS`), and 1600 cells in all, whose median tells
+the background to 4 %. [pixels]"""
 WIDE = 2.0
 """Extent of a target that is more than a point, over that of a point. ``python -m
 validation.experiments.thresholds answers``: with 1 and 4 the answers in four rooms with posts, a

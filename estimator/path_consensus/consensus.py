@@ -40,10 +40,13 @@ MOST_PLACES = 200
 """Places whose lists are solved together; the time grows with their square. [-]"""
 UNSEEN_TOO = 0.5
 """Probability that the path over one mirror alone is not listed, where all that is listed comes
-over one more: for each mirror that is found. Chosen, not measured. [-]"""
+over one more: for each mirror that is found. Of drawn path lists with a second wall behind a first,
+0.17 lack the second alone where nothing hides it, and 0.48 where a screen may: the larger leaves
+more in doubt (``python -m validation.experiments.thresholds lists``). [-]"""
 BY_CHANCE = 0.05
-"""Prior probability that a place's paths have nothing to do with what explains them. Chosen, not
-measured. [-]"""
+"""Prior probability that a place's paths have nothing to do with what explains them: ln(50) less
+than they must gain to be certain, and one agreeing path gains more; half and twice of it are 0.7 of
+that (``python -m validation.experiments.thresholds lists``). [-]"""
 LEAST_TOLD = 0.75
 """Share of all paths that a room must explain. In rooms of tuning, right ones explained 0.83 to
 0.93, wrong ones 0.45 to 0.70. [-]"""

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from mmslam.cli import about, batch, data, room
+from mmslam.cli.overriding_command import OverridingCommand
 
 app = typer.Typer(
     name="mmslam",
@@ -44,9 +45,9 @@ def main(
 
 
 # In the order in which the help lists them.
-app.command()(room.scenes)
-app.command()(room.run)
-app.command()(room.simulate)
+app.command(cls=OverridingCommand)(room.scenes)
+app.command(cls=OverridingCommand)(room.run)
+app.command(cls=OverridingCommand)(room.simulate)
 app.command()(room.locate)
 app.command()(room.image)
 app.command()(room.track)

@@ -17,7 +17,9 @@ GRID_AXES = ("x", "y", "z", "azimuth")
 """Names of array axes: of a list of positions, and of a scan over a grid."""
 
 FEWEST_PHASES = 100
-"""Phases from which their extent tells the unit. Chosen, not measured. [-]"""
+"""Phases from which their extent tells the unit: n phases that are spread evenly fill a part p of a
+turn with the probability 1 − n pⁿ⁻¹ + (n − 1) pⁿ, that of :data:`FILLED` with 96 %; of 50, which
+would be refused in the wrong unit as rarely, 28 % would be missed. [-]"""
 FILLED = 0.95
 """Part of a turn that phases fill: of 100 that are spread evenly all but 4 % do. [-]"""
 

@@ -24,7 +24,9 @@ ANGLE_OVERSAMPLING = 8
 """Samples of the cosine for each antenna: at half a wavelength, seven for each −3 dB beam, so that
 the search begins on the main lobe. [-]"""
 FEWEST_COSINES = 64
-"""Least number of samples of the cosine, for small arrays. Chosen, not measured. [-]"""
+"""Least number of samples of the cosine, for arrays of fewer than eight antennas: 1/32 apart, so
+that the search begins on the main lobe, λ/D to either side, of arrays D of up to 32 wavelengths.
+[-]"""
 COSINE_TOLERANCE = 1e-8
 """Tolerance of a cosine: the square root of float64's rounding, below which a maximum is flat.
 [-]"""

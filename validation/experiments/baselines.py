@@ -1,6 +1,7 @@
 """The methods of the thesis' introduction against ours: LoS, LoS and one wall, NLoS.
 
-Run as ``python -m validation.experiments.baselines [--quick] [FILE.png]``. A trial of all methods
+Run as ``python -m validation.experiments.baselines [--quick | --scales] [FILE.png]``; ``--scales``
+prints what the weight of angles does to fingerprints, and nothing else. A trial of all methods
 takes some 20 s on two idle cores: eighteen of them, and three with ``--quick``. The numbers
 go to a CSV file beside the figure.
 
@@ -33,7 +34,7 @@ from estimator.localization.pipeline import locate
 from scenes.files.loading import load_scenario
 from simulator.simulation import simulate
 from validation.baselines.angle_difference import angle_difference
-from validation.baselines.fingerprinting import fingerprinting
+from validation.baselines.fingerprinting import fingerprinting, fixes_by_weight
 from validation.baselines.multiband_toa import multiband_toa
 from validation.baselines.room import Baseline, Room
 from validation.baselines.rssi_ranging import rssi_ranging
@@ -226,6 +227,13 @@ def write_numbers(path: Path, trials: Sequence[Trial]) -> None:
 
 def main(arguments: list[str]) -> None:
     """Run the methods, write numbers and figure, and check the claims."""
+    if "--scales" in arguments:
+        for case, (name, places) in CASES.items():
+            position = f"users.user.position_m=[{places[0][0]}, {places[0][1]}]"
+            fixes = fixes_by_weight(Room(load_scenario(name, (position,)), seed=0))
+            errors = [1e3 * float(np.hypot(*(fix - places[0]))) for fix in fixes]
+            print(f"{case}: " + ", ".join(f"{error:.0f} mm" for error in errors), flush=True)
+        return
     quick = "--quick" in arguments
     names = [argument for argument in arguments if argument != "--quick"]
     path = Path(names[0] if names else "baselines.png")

@@ -3,7 +3,7 @@
 Run as ``python -m validation.experiments.thresholds [TABLE ...] [DRAWS] [--only CONSTANT ...]``;
 with ``--only BLOCKED --only USUAL`` the tables of scans hold these constants alone.
 
-Not in the thesis, whose walls are marked by hand. Eight tables:
+Not in the thesis, whose walls are marked by hand. Nine tables:
 
 - ``chance``: false-alarm rates and false detections by noise and random peaks
   (:mod:`validation.trials.chance_finds`);
@@ -18,7 +18,8 @@ Not in the thesis, whose walls are marked by hand. Eight tables:
 - ``images``: targets at scatterers and false ones in scans in closed form, of points, letters and
   soil, with a linear and a planar array (:mod:`validation.trials.measured_scans`);
 - ``space``: as ``answers`` in rooms in space (the set ``space`` of random rooms, those for tuning);
-- ``lists``: the same for priors of path lists (:mod:`validation.trials.list_answers`).
+- ``lists``: the same for priors of path lists (:mod:`validation.trials.list_answers`);
+- ``limits``: what is lost by limits of searches (:mod:`validation.trials.numerical_limits`).
 
 Claims that are asserted: each threshold does what its docstring states, within the limits in the
 table; and no scan's own value gives fewer right answers, or more false ones, than a neighbour.
@@ -59,6 +60,8 @@ from validation.trials.list_answers import (
     unlisted_alone,
 )
 from validation.trials.measured_scans import KINDS, DrawnScan, drawn_scan
+from validation.trials.numerical_limits import limit_rows
+from validation.trials.path_lists import KINDS as ROOM_KINDS
 from validation.trials.room_answers import (
     DIFFUSE,
     DIFFUSE_SEEDS,
@@ -84,7 +87,7 @@ from validation.trials.wall_statistics import (
     wall_statistics,
 )
 
-TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space", "lists")
+TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space", "lists", "limits")
 DRAWS = 12
 """Walls of each family. [-]"""
 ROOM_SEEDS = 1
@@ -93,6 +96,11 @@ SCAN_SEEDS = 3
 """Scans of each kind and array: of seeds below 1000, which are for tuning. [-]"""
 SPACE_ROOMS = 2
 """Rooms in space. [-]"""
+BRIGHT_ASIDE = ("plain", 4)
+"""Random room for tuning with the most bright sources beyond the imaged sector, of the first five
+of its set."""
+HELD_ROOMS = 50
+"""Rooms of each kind whose lists are counted, in the plane and in space. [-]"""
 LIST_ROOMS = 2
 """Rooms of each kind with path lists, in the plane and in space. [-]"""
 SCENES: tuple[Kind, ...] = ("wall", "wall", "wall", "corner", "corner", "corner", "posts", "noise")
@@ -221,9 +229,9 @@ def overlap_rows(echoes: tuple[Surveyed, ...], *, draws: int = 400) -> list[Row]
     ]
 
 
-def space_room(number: int) -> SimulatedRoom:
-    """Simulate a room of the set ``space`` for tuning, with its truth."""
-    room = draw_room("space", number, purpose="tuning")
+def random_room(kind: str, number: int) -> SimulatedRoom:
+    """Simulate a random room for tuning, with its truth."""
+    room = draw_room(kind, number, purpose="tuning")
     simulation = simulate(room, seed=SEEDS["tuning"], sample=number)
     return SimulatedRoom(
         measurement=simulation.measurement, truth=truth_from_dataset(simulation.truth)
@@ -347,13 +355,23 @@ def main(arguments: list[str]) -> None:
         ]
         rows += scanned_rows(scans, partial(scan_answers, scanned))
     if "space" in wanted and (scans := only_named(SPACE_SCANS, options.only)):
-        spaces = [space_room(number) for number in range(SPACE_ROOMS)]
+        spaces = [random_room("space", number) for number in range(SPACE_ROOMS)]
         rows += scanned_rows(scans, partial(answers, spaces))
     if "lists" in wanted and (scans := only_named(LIST_SCANS, options.only)):
         walked = drawn_lists(LIST_ROOMS)
-        print(f"listed paths over 0 to 3 walls: {np.round(listed_orders(walked), 2)}")
-        print(f"second walls of pairs that are not listed alone: {unlisted_alone(walked):.2f}")
+        for kind in ROOM_KINDS:
+            held = [one for one in drawn_lists(HELD_ROOMS) if one.kind == kind]
+            print(
+                f"{kind}: listed paths over 0 to 3 walls {np.round(listed_orders(held), 2)}; "
+                f"second walls of pairs that are not listed alone {unlisted_alone(held):.2f}"
+            )
         rows += scanned_rows(scans, partial(list_answers, walked))
+    if "limits" in wanted:
+        echoes = surveyed(SCENES, 1)
+        echoes += tuple(simulated_wall(overrides, 100) for overrides in WALLS.values())
+        aside = random_room(*BRIGHT_ASIDE).measurement.echo
+        assert aside is not None
+        rows += limit_rows(echoes, aside, [rough_pilot(*wall, 0) for wall in DIFFUSE])
     conclude(rows)
 
 

@@ -217,3 +217,15 @@ def test_an_array_that_cannot_locate_is_refused_before_the_simulation(elements: 
 def test_antennas_that_stand_apart_cannot_locate_and_have_no_design() -> None:
     assert "its antennas stand apart" in refused("run", "rcs_drywall")
     assert "stand by themselves" in refused("design", "rcs_drywall")
+
+
+@pytest.mark.parametrize("command", [("run",), ("simulate", "-o", "it.zarr"), ("scenes",)])
+def test_an_override_without_set_is_refused_with_the_option_that_it_lacks(
+    command: tuple[str, ...],
+) -> None:
+    told = refused(*command, "slam_2d", "objects.wall.angle_deg=40", "seed.x=1").replace("│ │ ", "")
+    assert "extra arguments (objects.wall.angle_deg=40 seed.x=1)" in told
+    assert "write --set objects.wall.angle_deg=40 --set seed.x=1" in told
+    plain = refused(*command, "slam_2d", "again")
+    assert "extra argument (again)" in plain
+    assert "--set" not in plain

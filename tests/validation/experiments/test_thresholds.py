@@ -21,6 +21,12 @@ from validation.trials.answer_scans import answer_line, answer_row, label, only_
 from validation.trials.constant_scans import ANSWER_SCANS, DECISION_SCANS, RIVAL_SCAN, Scan
 from validation.trials.drawn_echoes import draw_echo
 from validation.trials.list_answers import list_answers, listed_orders, unlisted_alone
+from validation.trials.numerical_limits import (
+    facets_of_a_cloud,
+    ridges_of_echoes,
+    rounds_of_trilateration,
+    shoulders_of_walls,
+)
 from validation.trials.path_lists import SounderErrors, drawn_paths
 from validation.trials.room_answers import answers, diffuse_answers, rough_pilot, simulated_room
 from validation.trials.wall_statistics import changed, detection, surveyed, wall_statistics
@@ -152,6 +158,23 @@ def test_a_user_over_a_rough_wall_is_placed_unless_no_wall_may_count_as_lit() ->
     with changed(RIVAL_SCAN.module, "FEWEST_LIT", 1.1):
         open_ = diffuse_answers([pilot])
     assert (open_.right, open_.wrong) == (0, 0)
+
+
+def test_limits_of_searches_leave_out_what_they_say() -> None:
+    echoes = surveyed(["wall"], 0)
+    rows = [*ridges_of_echoes(echoes), *shoulders_of_walls(echoes)]
+    rows += [
+        *rounds_of_trilateration([rough_pilot(60.0, 0.05, 0)]),
+        *facets_of_a_cloud(np.random.default_rng(0), draws=5),
+    ]
+    for row in rows:
+        assert row.passed, f"{row.name}: {row.value}"
+    with changed("estimator.mapping.diffuse_multipath", "FACETS", 3):
+        few, _ = facets_of_a_cloud(np.random.default_rng(0), draws=5)
+    assert not few.passed
+    with changed("estimator.walls.ridge_detection", "MOST_RIDGES", 1):
+        (bound,) = ridges_of_echoes(echoes)
+    assert not bound.passed
 
 
 @pytest.mark.slow
