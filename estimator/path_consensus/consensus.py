@@ -44,9 +44,9 @@ over one more: for each mirror that is found. Of drawn path lists with a second 
 0.17 lack the second alone where nothing hides it, and 0.48 where a screen may: the larger leaves
 more in doubt (``python -m validation.experiments.thresholds lists``). [-]"""
 BY_CHANCE = 0.05
-"""Prior probability that a place's paths have nothing to do with what explains them: ln(50) less
-than they must gain to be certain, and one agreeing path gains more; half and twice of it are 0.7 of
-that (``python -m validation.experiments.thresholds lists``). [-]"""
+"""Prior probability that a place's paths have nothing to do with what explains them. What explains
+one path more must gain ln 50 for the place to be certain; half and twice of the prior are ln 2 of
+that. [-]"""
 LEAST_TOLD = 0.75
 """Share of all paths that a room must explain. In rooms of tuning, right ones explained 0.83 to
 0.93, wrong ones 0.45 to 0.70. [-]"""

@@ -69,7 +69,7 @@ WIDEST, SHIFTS = 1.5, 49
 [cells c/B], and how many: sixteen a cell. [-]"""
 
 ROUNDS = 4
-"""Trilaterations, each from the place of the last: Gauss-Newton steps. Eight times as many move the
+"""Trilaterations, each from the place of the last: Gauss-Newton steps. Four times as many move the
 place by 4e-5 of its deviation at most, of eight pilots (``python -m
 validation.experiments.thresholds limits``). [-]"""
 
