@@ -17,8 +17,8 @@ OVERSAMPLING = 8
 """Samples of length for each cell c/B: the search begins within a sixteenth of a cell of a peak.
 [-]"""
 MOST_PATHS = 6
-"""Most paths of the search over a band with gaps: the direct one, the wall's, and those of the wall's
-two ends are four, and two are left for what the fit of these leaves. [-]"""
+"""Most paths of the search over a band with gaps: the direct one, the wall's, and those of the
+wall's two ends are four, and two are left for what the fit of these leaves. [-]"""
 LENGTH_TOLERANCE = 1e-7
 """Tolerance of a path's length: far below a wavelength of 1 mm. [m]"""
 ANGLE_OVERSAMPLING = 8
