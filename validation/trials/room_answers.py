@@ -148,7 +148,8 @@ def told_by(
     users: Sequence[UserEstimate], mirrors: Sequence[Mirror], targets: Sequence[Target] = ()
 ) -> str:
     """Write users, mirrors and targets out in full, so that answers differ if anything does."""
-    parts = [asdict(one) for one in (*users, *mirrors, *targets)]
+    answered: list[UserEstimate | Mirror | Target] = [*users, *mirrors, *targets]
+    parts = [asdict(one) for one in answered]
     with np.printoptions(precision=17, threshold=sys.maxsize):
         return repr(parts)
 
