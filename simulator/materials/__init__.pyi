@@ -21,6 +21,7 @@ from .fresnel_slab import (
 )
 from .permittivity import (
     ConstantPermittivity,
+    JoinedPermittivity,
     MaterialError,
     Permittivity,
     PowerLawPermittivity,
@@ -35,6 +36,7 @@ __all__ = [
     "Conductor",
     "ConstantPermittivity",
     "Dielectric",
+    "JoinedPermittivity",
     "Legs",
     "Material",
     "MaterialError",

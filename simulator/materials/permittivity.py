@@ -20,6 +20,13 @@ from scenes.schema.permittivity_table import (
     value_problem,
 )
 
+WIDEST_GAP = 1.1
+"""Ratio of frequencies without a row between two that are joined: most tables go from 100 to 110
+GHz, in the middle of what is sold as W band. [-]"""
+
+ROUNDING = 1e-9
+"""Relative error of frequencies that are compared. [-]"""
+
 
 class MaterialError(ValueError):
     """A material cannot be used; the message names it, the value, the limit and the remedy."""
@@ -71,8 +78,39 @@ class PowerLawPermittivity:
         _check_band(
             f"the ITU-R P.2040-4 row of {self.name!r}", frequencies, self.lowest, self.highest
         )
+        return self.law(frequencies)
+
+    def law(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Evaluate the power law at any frequency."""
         conductivity = self.factor * (frequencies / 1e9) ** self.exponent
         return self.real - 1j * conductivity / (2.0 * np.pi * frequencies * epsilon_0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JoinedPermittivity:
+    """Two rows of ITU-R P.2040-4 that meet, or nearly, within a band.
+
+    Around where they meet both laws are averaged with weights that are linear in the logarithm of
+    the frequency: a step there would ring in the range profiles of a sweep across it.
+    """
+
+    lower: PowerLawPermittivity
+    upper: PowerLawPermittivity
+
+    def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Evaluate both laws, within the band that the two were fitted to together."""
+        _check_band(
+            f"the ITU-R P.2040-4 rows of {self.lower.name!r}",
+            frequencies,
+            self.lower.lowest,
+            self.upper.highest,
+        )
+        meet = np.sort([self.lower.highest, self.upper.lowest]) * [1 / WIDEST_GAP, WIDEST_GAP]
+        share = np.clip(np.log(frequencies / meet[0]) / np.log(meet[1] / meet[0]), 0.0, 1.0)
+        joined: np.ndarray = (1 - share) * self.lower.law(frequencies) + share * self.upper.law(
+            frequencies
+        )
+        return joined
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +133,9 @@ class TabulatedPermittivity:
         return values
 
 
-Permittivity = ConstantPermittivity | PowerLawPermittivity | TabulatedPermittivity
+Permittivity = (
+    ConstantPermittivity | PowerLawPermittivity | JoinedPermittivity | TabulatedPermittivity
+)
 """Complex relative permittivity as a function of frequency."""
 
 
@@ -131,8 +171,10 @@ ITU_ROWS: Mapping[str, tuple[tuple[float, float, float, float, float], ...]] = {
 band, the first is used."""
 
 
-def itu_permittivity(name: str, frequencies: Float[np.ndarray, " freqs"]) -> PowerLawPermittivity:
-    """Pick the row of ITU-R P.2040-4 that covers the whole band.
+def itu_permittivity(
+    name: str, frequencies: Float[np.ndarray, " freqs"]
+) -> PowerLawPermittivity | JoinedPermittivity:
+    """Pick the row of ITU-R P.2040-4 that covers the whole band, or join two that meet in it.
 
     Raises
     ------
@@ -142,16 +184,31 @@ def itu_permittivity(name: str, frequencies: Float[np.ndarray, " freqs"]) -> Pow
     if name not in ITU_ROWS:
         raise MaterialError(f"unknown ITU material {name!r}; known: {', '.join(ITU_ROWS)}")
     low, high = frequencies.min() / 1e9, frequencies.max() / 1e9
-    for lowest, highest, real, factor, exponent in ITU_ROWS[name]:
-        if lowest <= low and high <= highest:
-            return PowerLawPermittivity(
-                name=name,
-                real=real,
-                factor=factor,
-                exponent=exponent,
-                lowest=lowest * 1e9,
-                highest=highest * 1e9,
-            )
+    laws = [
+        PowerLawPermittivity(
+            name=name,
+            real=real,
+            factor=factor,
+            exponent=exponent,
+            lowest=lowest * 1e9,
+            highest=highest * 1e9,
+        )
+        for lowest, highest, real, factor, exponent in ITU_ROWS[name]
+    ]
+
+    def begins(law: PowerLawPermittivity) -> bool:
+        return bool(law.lowest / 1e9 <= low)
+
+    def ends(law: PowerLawPermittivity) -> bool:
+        return bool(high <= law.highest / 1e9)
+
+    for law in laws:
+        if begins(law) and ends(law):
+            return law
+    for lower in filter(begins, laws):
+        for upper in filter(ends, laws):
+            if upper.lowest <= WIDEST_GAP * (1 + ROUNDING) * lower.highest:
+                return JoinedPermittivity(lower=lower, upper=upper)
     rows = ", ".join(f"{row[0]:g}-{row[1]:g}" for row in ITU_ROWS[name])
     raise MaterialError(
         f"material {name!r}: no row of ITU-R P.2040-4 covers {low:g}-{high:g} GHz (rows: {rows} "
