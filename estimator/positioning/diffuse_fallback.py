@@ -21,7 +21,9 @@ from estimator.walls.fitted_line import FittedLine
 
 MOST_ENERGY = 0.5
 """Share of the pilot's energy from which paths are not given up for what a wall scatters: most of
-it. Chosen, not measured. [-]"""
+it, since shares add up to 1 and what the wall scatters then has less. In five of the rooms of
+``python -m validation.experiments.thresholds decisions`` 0.25 and 0.9 change nothing: paths and
+diffuse field agree, or the paths hold hardly any energy. [-]"""
 
 CELLS_APART = 3.0
 """Cross-range cells λR/D from a strong path's place at which the diffuse field contradicts it:
@@ -31,8 +33,9 @@ ALONE, BEHIND = 0.6, 0.05
 """Probability of a place that one wall's scattering alone tells, and of its image behind it: 8 of
 14 such places in 125 random rooms were right, and none was behind the wall. [-]"""
 TOGETHER = 0.9995
-"""Probability of a place that scattering off two walls, or scattering and a path, tell: above what
-makes a place certain. Chosen, not measured. [-]"""
+"""Probability of a place that scattering off two walls, or scattering and a path, tell: one less
+half of the doubt that :data:`estimator.positioning.posterior.CERTAIN` allows, the other half of
+which is left to places that scatter alike. [-]"""
 
 UNSTATED = 0.5
 """Probability of an answer that states none: nothing is known for or against it. [-]"""
