@@ -6,6 +6,7 @@ cancellation, and what is common to all channels is applied once per point in fl
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -14,15 +15,21 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.compute import engine
-from estimator.compute.integer_division import row_and_column
 from estimator.compute.sincos import sincos_of_turns
+from estimator.imaging.profile_tables import (
+    CubicTable,
+    FineTable,
+    ProfileTable,
+    cubic_table,
+    fine_table,
+    is_worth_it,
+)
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
+from estimator.imaging.unambiguous_points import refuse_points_out_of_range
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 
 POINTS_PER_LANE = 4
 """Points that share each load of an antenna position; 4 was fastest on AVX-512. [-]."""
-
-_GUARD = 2  # cells repeated past the unambiguous range, for lengths that round up to it
 
 FLAT = 1e-10
 """Extent below which an array does not span an axis: a phase of 1e-6 at 300 GHz. [m]."""
@@ -43,8 +50,17 @@ class Focuser:
     """Range profiles that lie in the memory of the device that focuses them."""
 
     profiles: RangeProfiles
-    table: Any  # UInt64: a complex coefficient in each, four for each channel and cell
     legs: tuple["Leg", ...]
+
+    @cached_property
+    def cubic(self) -> CubicTable:
+        """For few points."""
+        return cubic_table(self.profiles)
+
+    @cached_property
+    def fine(self) -> FineTable:
+        """For many points: slow to make, fast to read."""
+        return fine_table(self.profiles, self.cubic)
 
 
 def backproject(
@@ -138,22 +154,9 @@ def prepare(profiles: RangeProfiles) -> Focuser:
         If they are too many for the device's 32-bit addresses.
     """
     arrays = engine.arrays()
-    channels, cells, order = profiles.coefficients.shape
-    if channels * (cells + _GUARD) * order >= 2**32:
-        raise MeasurementError(
-            f"{channels} positions x {cells} range cells are more than 32-bit addresses reach; "
-            "image the positions in parts and add the images"
-        )
-    # A path length that is rounded up to the unambiguous one reads the first cells again.
-    source = arrays.UInt64(np.ascontiguousarray(profiles.coefficients).view(np.uint64).ravel())
-    entry = dr.arange(arrays.UInt32, channels * (cells + _GUARD) * order)
-    row, column = row_and_column(entry, (cells + _GUARD) * order)
-    period = dr.opaque(arrays.UInt32, cells * order)
-    column = dr.select(column < period, column, column - period)
-    table = dr.gather(arrays.UInt64, source, row * period + column)
-    legs = tuple(_leg(arrays, ends) for ends in profiles.legs)
-    dr.eval(table)
-    return Focuser(profiles, table, legs)
+    focuser = Focuser(profiles, tuple(_leg(arrays, ends) for ends in profiles.legs))
+    _ = focuser.cubic  # refused before any point is
+    return focuser
 
 
 def focus(
@@ -185,7 +188,7 @@ def focus(
     order = _axes_by_range(points, focuser.legs[-1].centre)
     ordered = np.moveaxis(points, order, range(len(order)))
     columns = np.moveaxis(ordered, -1, 0).reshape(3, -1).astype(np.float64)
-    _refuse_points_out_of_range(focuser, columns)
+    refuse_points_out_of_range(focuser.profiles, columns)
     image = _focus(focuser, columns, amplitude_ratio).reshape(ordered.shape[:-1])
     return np.moveaxis(image, range(len(order)), order).copy()
 
@@ -216,56 +219,6 @@ def _axes_by_range(
     return tuple(int(axis) for axis in np.argsort(changes, kind="stable")[::-1])
 
 
-def _refuse_points_out_of_range(focuser: Focuser, points: Float[np.ndarray, "3 points"]) -> None:
-    low, high = points.min(axis=1), points.max(axis=1)  # NaN if any is
-    if not np.all(np.isfinite([low, high])):
-        bad = int(np.count_nonzero(~np.isfinite(points).all(axis=0)))
-        raise MeasurementError(
-            f"{bad} of {points.shape[1]} pixels have NaN or infinite coordinates"
-        )
-    profiles = focuser.profiles
-    corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1)
-    # A length is convex, over the points' places and over the antennas': at most what corners of
-    # the boxes around them give.
-    if np.all(_longest_possible(profiles, corners) <= profiles.unambiguous):
-        return
-    bound = _longest_possible(profiles, points)
-    longest = _longest_path(profiles, points[:, bound > profiles.unambiguous])
-    if longest > profiles.unambiguous:
-        ways = profiles.passes * len(profiles.legs)
-        raise MeasurementError(
-            f"pixels reach {longest / ways:.3f} m from the array, but the frequency step is "
-            f"unambiguous only up to {profiles.unambiguous / ways:.3f} m; take smaller frequency "
-            "steps or a nearer grid"
-        )
-
-
-def _longest_possible(
-    profiles: RangeProfiles, points: Float[np.ndarray, "3 points"]
-) -> Float[np.ndarray, " points"]:
-    """Bound the paths from points to the antennas. [m]."""
-    ways = np.sum([_farthest_corner(leg, points) for leg in profiles.legs], axis=0)
-    return np.asarray(profiles.passes * ways)
-
-
-def _farthest_corner(
-    leg: Float[np.ndarray, "channels 3"], points: Float[np.ndarray, "3 points"]
-) -> Float[np.ndarray, " points"]:
-    """Distance of each point to the farthest corner of the box around a leg's antennas. [m]."""
-    low, high = leg.min(axis=0)[:, None], leg.max(axis=0)[:, None]
-    far = np.maximum(np.abs(points - low), np.abs(points - high))
-    distance: np.ndarray = np.sqrt(np.einsum("xp,xp->p", far, far))
-    return distance
-
-
-def _longest_path(profiles: RangeProfiles, points: Float[np.ndarray, "3 points"]) -> float:
-    longest = 0.0
-    for channel in zip(*profiles.legs, strict=True) if points.size else ():
-        path = sum(np.linalg.norm(points - end[:, None], axis=0) for end in channel)
-        longest = max(longest, profiles.passes * float(np.max(path)))
-    return longest
-
-
 def _focus(
     focuser: Focuser, columns: Float[np.ndarray, "3 points"], amplitude_ratio: bool
 ) -> Complex[np.ndarray, " points"]:
@@ -289,9 +242,10 @@ def _focus(
         index = dr.minimum(lane * POINTS_PER_LANE + i, last)
         point = [dr.gather(arrays.Float64, axis, index) for axis in coordinates]
         groups.append(_point_state(arrays, point, focuser.legs, per_cell))
-    sums = _sum_over_channels(arrays, focuser, groups, per_cell, turns, amplitude_ratio)
+    table: ProfileTable = focuser.fine if is_worth_it(profiles, count) else focuser.cubic
+    sums = _sum_over_channels(arrays, focuser, table, groups, per_cell, turns, amplitude_ratio)
 
-    norm = dr.opaque(arrays.Float64, 1.0 / profiles.gain)
+    norm = dr.opaque(arrays.Float64, table.scale / profiles.gain)
     channels = dr.opaque(arrays.Float64, len(profiles.coefficients))
     results = []
     for group, (re, im, weight) in zip(groups, sums, strict=True):
@@ -340,15 +294,15 @@ def _opaque(arrays: Any, value: float) -> Any:
 def _sum_over_channels(
     arrays: Any,
     focuser: Focuser,
+    table: ProfileTable,
     groups: list[dict[str, Any]],
     per_cell: Any,
     turns: Any,
     amplitude_ratio: bool,
 ) -> list[tuple[Any, Any, Any]]:
     """Add up all channels for each group of points, less the phase to the centre."""
-    channels, cells, order = focuser.profiles.coefficients.shape
-    end = dr.opaque(arrays.UInt32, channels)
-    stride = dr.opaque(arrays.UInt32, cells + _GUARD)
+    end = dr.opaque(arrays.UInt32, len(focuser.profiles.coefficients))
+    stride = dr.opaque(arrays.UInt32, table.cells)
     scale, turns = arrays.Float(per_cell), arrays.Float(turns)
     # A point on an antenna at the centre has 0/0 here; its path difference is 0 then.
     tiny = 1e-30
@@ -369,17 +323,10 @@ def _sum_over_channels(
                 if amplitude_ratio:
                     ratio = ratio * distance / dr.maximum(length, tiny)
             shift = shift * scale
-            place = group["fraction"] + shift
+            place = (group["fraction"] + shift) * table.finer
             whole = dr.round(place)
-            v = place - whole
-            entry = order * (row + arrays.UInt32(group["cell"] + arrays.Int32(whole)))
-            profile_re, profile_im = arrays.Float(0), arrays.Float(0)
-            for i in reversed(range(order)):
-                # Both parts in one load; a packet of all four would cost a call on the CPU.
-                pair = dr.gather(arrays.UInt64, focuser.table, entry + i)
-                low, high = arrays.UInt32(pair), arrays.UInt32(pair >> 32)
-                profile_re = dr.fma(profile_re, v, dr.reinterpret_array(arrays.Float, low))
-                profile_im = dr.fma(profile_im, v, dr.reinterpret_array(arrays.Float, high))
+            cell = arrays.UInt32(table.finer * group["cell"] + arrays.Int32(whole))
+            profile_re, profile_im = table.read(arrays, row, cell, place - whole)
             turn = shift * turns
             sine, cosine = sincos_of_turns(turn)
             if amplitude_ratio:

@@ -6,6 +6,7 @@ from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
 from estimator.imaging.backprojection import backproject, focus, focus_uplink, prepare
+from estimator.imaging.profile_tables import POINTS_PER_CELL, is_worth_it
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 from estimator.results.pixel_grid import PixelGrid
@@ -78,6 +79,32 @@ def test_the_error_stays_below_60_db_where_a_target_stands() -> None:
     echo = echo_of(target, positions)
     direct = direct_sum(echo.samples, 2 * delays(points, positions), BAND)
     assert np.abs(backproject(echo, points) - direct).max() <= FLOAT64_ERROR
+
+
+def test_many_points_are_read_from_a_fine_table_to_60_db() -> None:
+    positions = linear_array(1)
+    target = np.array([0.03, 0.31, 0.0])
+    echo = echo_of(target, positions)
+    profiles = range_profiles(echo)
+    count = int(np.ceil(POINTS_PER_CELL * profiles.coefficients.shape[1]))
+    assert is_worth_it(profiles, count)
+    assert not is_worth_it(profiles, count - 1)
+    points = target + np.linspace(-2e-3, 2e-3, count)[:, None] * np.array([0.0, 1.0, 0.0])
+    direct = direct_sum(echo.samples, 2 * delays(points, positions), BAND)
+    error = np.abs(backproject(echo, points) - direct)
+    assert error.max() <= FLOAT64_ERROR
+    assert error.max() > 0.02 * FLOAT64_ERROR  # of the cubics, which few points are read from
+
+
+def test_a_fine_table_of_strong_and_weak_positions_keeps_the_image() -> None:
+    positions = linear_array(8)
+    samples = noise(8, 301) * np.logspace(0, -3, 8)[:, None]
+    echo = Echo(samples=samples, positions=positions, frequencies=BAND)
+    points = RNG.uniform([-0.15, 0.2, 0.0], [0.15, 0.5, 0.0], (5000, 3))
+    direct = direct_sum(samples, 2 * delays(points, positions), BAND)
+    error = np.abs(backproject(echo, points) - direct)
+    # Noise of unit power: the bound for a point target holds for each sample's share of it.
+    assert error.max() <= FLOAT64_ERROR * np.abs(samples).mean()
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.3, 0.0), (0.1, 0.25, 0.02), (-0.2, 0.4, -0.1)])
