@@ -8,16 +8,19 @@ from jaxtyping import Bool, Complex, Float
 from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
-from estimator.imaging.backprojection import backproject
+from estimator.imaging.backprojection import focus
 from estimator.imaging.peak_detection import image_contrast, mean_background, significant_peaks
 from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
+from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.range_alias import FocusByRange, focus_by_range
-from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
 
 STEP = 0.75
 """Spacing of the image's grid in range and sine, over the untapered cell: 0.49 of the cell of the
 survey's taper, so that a peak between pixels loses 0.9 dB at most along each axis. [-]"""
+
+WHOLE = 1e-6
+"""Part of a step by which a sector may miss its last pixel, by rounding. [-]"""
 
 REFLECTED = 0.5
 """Coherence, with the wavefront of a mirror that faces the array, from which a peak is the array's
@@ -59,25 +62,32 @@ class Survey:
         return image_contrast(float(np.max(np.abs(self.values) ** 2)), self.background)
 
 
-def survey(echo: Echo) -> Survey:
+def survey(
+    echo: Echo,
+    *,
+    prepared: PreparedEcho | None = None,
+    values: Complex[np.ndarray, "ranges sines"] | None = None,
+) -> Survey:
     """Image everything within reach, at half the resolution of a low-sidelobe taper.
 
     Parameters
     ----------
     echo
         In the array's frame.
+    prepared
+        The same, if it was looked at before.
+    values
+        Its tapered image on :func:`survey_grid`, if that is known already. [-]
     """
     resolution = echo_resolution(echo)
-    nearest, farthest = echo_reach(echo)
-    ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)
-    limit = imaged_sine(echo)
-    count = 2 * int(np.ceil(limit / (STEP * resolution.across_ray))) + 1
-    sines = np.linspace(-limit, limit, count)
+    ready = PreparedEcho(echo) if prepared is None else prepared
+    ranges, sines = survey_grid(echo, imaged_sine(echo))
     points = sector_points(ranges[:, None], sines)
     taper = survey_weights(echo)
-    values = backproject(echo, points, weights=taper)
+    if values is None:
+        values = focus(ready.tapered, points)
     peaks = significant_peaks(np.abs(values) ** 2, points)
-    untapered = range_profiles(echo)
+    untapered = ready.plain.profiles
     tried = bent_intensities(untapered, peaks, resolution)
     by_range = focus_by_range(untapered, peaks, resolution)
     beyond = by_range.points_beyond(peaks, coarse_resolution(resolution))
@@ -85,10 +95,9 @@ def survey(echo: Echo) -> Survey:
     background = mean_background(np.abs(values) ** 2)
     noise = background * taper.sum() ** 2 / (taper**2).sum()
     across = frequency_taper(echo.frequencies, SURVEY_TAPER)
-    profiles = range_profiles(echo, weights=across[None, :])
     by_shape = [
         coherence_factor(
-            profiles, peaks, resolution, flat=flat, noise=noise * float((across**2).sum())
+            ready.over_band, peaks, resolution, flat=flat, noise=noise * float((across**2).sum())
         )
         for flat in (False, True)
     ]
@@ -105,6 +114,23 @@ def survey(echo: Echo) -> Survey:
         as_mirror=by_shape[1],
         background=background,
     )
+
+
+def survey_grid(
+    echo: Echo, widest: float
+) -> tuple[Float[np.ndarray, " ranges"], Float[np.ndarray, " sines"]]:
+    """Return the ranges [m] and the sines [-] at which an echo is surveyed, up to a largest sine.
+
+    Sectors of any width share their pixels: the steps are such that the sector without grating
+    lobes ends with one.
+    """
+    resolution = echo_resolution(echo)
+    nearest, farthest = echo_reach(echo)
+    ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)
+    limit = imaged_sine(echo)
+    step = limit / int(np.ceil(limit / (STEP * resolution.across_ray)))
+    half = int(np.floor(widest / step + WHOLE))
+    return ranges, step * np.arange(-half, half + 1)
 
 
 def sector_points(

@@ -9,6 +9,7 @@ from estimator.array.array_frame import ArrayFrame
 from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import Wall
 from estimator.imaging.peak_detection import image_contrast
+from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.target_detection import find_targets
 from estimator.mapping.wall_unfolding import unfold_seen_lines
@@ -51,9 +52,11 @@ def build_room_map(echo: Echo) -> RoomMap:
     -------
     The map, in the same frame.
     """
-    cleaned, brightest_aside = without_sources_aside(echo)
-    looked = survey(cleaned)
-    found = refine_by_echo(echo, looked, detect_mirrors(echo, looked))
+    prepared = PreparedEcho(echo)
+    cleaned = without_sources_aside(prepared)
+    looked = survey(cleaned.prepared.echo, prepared=cleaned.prepared, values=cleaned.image)
+    lines = detect_mirrors(echo, looked, prepared=prepared)
+    found = refine_by_echo(echo, looked, lines, prepared=prepared)
     resolution = echo_resolution(echo)
     unfolded = unfold_seen_lines(found, resolution)
     aperture = float(np.ptp(echo.positions[:, 0]))
@@ -65,7 +68,7 @@ def build_room_map(echo: Echo) -> RoomMap:
         targets=find_targets(looked, unfolded, found, resolution, aperture),
         unassigned_peaks=unassigned_peaks(echo, looked, found),
         survey=looked,
-        contrast=max(looked.contrast, image_contrast(brightest_aside, looked.background)),
+        contrast=max(looked.contrast, image_contrast(cleaned.strongest, looked.background)),
     )
 
 

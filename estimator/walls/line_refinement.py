@@ -8,10 +8,8 @@ from jaxtyping import Float
 
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
-from estimator.array.windows import survey_weights
-from estimator.imaging.backprojection import prepare
 from estimator.imaging.focusing import Focus, focus_within
-from estimator.imaging.range_compression import range_profiles
+from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
@@ -44,7 +42,11 @@ in these rooms, and 0.6 to 0.76 in their corners. [-]"""
 
 
 def refine_by_echo(
-    echo: Echo, looked: Survey, lines: Sequence[FittedLine]
+    echo: Echo,
+    looked: Survey,
+    lines: Sequence[FittedLine],
+    *,
+    prepared: PreparedEcho | None = None,
 ) -> tuple[FittedLine, ...]:
     """Place lines as the whole echo says; see :mod:`estimator.walls.line_fit_echo`.
 
@@ -56,14 +58,15 @@ def refine_by_echo(
         Its survey: what is bright beside a line has a part in the echo from the same ranges.
     lines
         As fitted to the image.
+    prepared
+        The echo, if it was looked at before.
 
     Returns
     -------
     The lines in the same order. One whose echo is not that of a straight rough wall is left.
     """
-    tapered = focus_within(
-        prepare(range_profiles(echo, weights=survey_weights(echo))), echo_reach(echo)[1]
-    )
+    ready = PreparedEcho(echo) if prepared is None else prepared
+    tapered = focus_within(ready.tapered, echo_reach(echo)[1])
     places, levels = _bright_beside(
         looked.peaks, lines, tapered, coarse_resolution(echo_resolution(echo))
     )

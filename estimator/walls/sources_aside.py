@@ -16,7 +16,7 @@ References
        baselines", Astronomy and Astrophysics Supplement 15, 1974.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import accumulate
 
 import numpy as np
@@ -25,11 +25,11 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_solve
 from scipy.ndimage import maximum_filter, maximum_filter1d
 
-from estimator.array.linear_array import WIDEST_SINE, echo_reach, echo_resolution, imaged_sine
-from estimator.array.windows import survey_weights
-from estimator.imaging.backprojection import backproject
+from estimator.array.linear_array import WIDEST_SINE, echo_resolution, imaged_sine
+from estimator.imaging.backprojection import focus
 from estimator.imaging.peak_detection import mean_background
-from estimator.imaging.survey_2d import STEP, sector_points
+from estimator.imaging.prepared_echo import PreparedEcho
+from estimator.imaging.survey_2d import STEP, sector_points, survey_grid
 from estimator.measurement.model import Echo
 from estimator.walls.scatterer_row import (
     adjoint,
@@ -65,31 +65,43 @@ MOST_SCATTERERS = 600
 """Scatterers about one source, for time: of larger apertures less is covered. [-]"""
 
 
-def without_sources_aside(echo: Echo) -> tuple[Echo, float]:
+@dataclass(frozen=True, kw_only=True)
+class Cleaned:
+    """An echo without bright sources beyond the imaged sector."""
+
+    prepared: PreparedEcho  # the very one that was given, if there are none
+    strongest: float
+    """Intensity of the brightest source in the tapered image, 0 of none: an echo of bright
+    sources is not noisy. [-]"""
+    image: Complex[np.ndarray, "ranges sines"] | None
+    """Tapered, on the survey's grid; ``None`` if it is not known. [-]"""
+
+
+def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     """Take the bright sources beyond the imaged sector off an echo.
 
     Parameters
     ----------
-    echo
-        In the array's frame.
-
-    Returns
-    -------
-    The echo, the same if the sector is as wide as any that is imaged; and the intensity of the
-    brightest source in the tapered image, 0 of none: an echo of bright sources is not noisy.
+    prepared
+        The echo. It is left as it is if the sector is as wide as any that is imaged.
     """
+    echo = prepared.echo
     limit = imaged_sine(echo)
     if limit >= WIDEST_SINE:
-        return echo, 0.0
-    points, sines = _all_around(echo)
-    within = np.abs(sines) <= limit
+        return Cleaned(prepared=prepared, strongest=0.0, image=None)
+    ranges, sines = survey_grid(echo, WIDEST_SINE)
+    points = sector_points(ranges[:, None], sines)
+    inner = len(survey_grid(echo, limit)[1])
+    outer = (len(sines) - inner) // 2
+    within = slice(outer, outer + inner)
     near = NEAR_LOBE * float(np.ptp(echo.positions[:, 0]))
     rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
-    weights = survey_weights(echo)
     dominant = []
     strongest = 0.0
+    image = None
     for _ in range(MOST_SOURCES):
-        intensity = np.abs(backproject(echo, points, weights=weights)) ** 2
+        image = focus(prepared.tapered, points)
+        intensity = np.abs(image) ** 2
         # The lobe of what is within the sector is weaker than that.
         shadow = maximum_filter1d(intensity[:, within].max(axis=1), 2 * rows + 1)
         tops = (intensity == maximum_filter(intensity, size=3)) & (intensity > shadow[:, None])
@@ -104,23 +116,16 @@ def without_sources_aside(echo: Echo) -> tuple[Echo, float]:
         left = echo.samples - _source_echo(echo, place)
         if np.linalg.norm(left) ** 2 < (1 - MOST_OF_IT) * np.linalg.norm(echo.samples) ** 2:
             dominant.append(place)
-        echo = replace(echo, samples=left)
+        echo, image = replace(echo, samples=left), None
+        prepared = PreparedEcho(echo)
     # What was fitted while others were there is left in part.
     for place in dominant:
-        echo = replace(echo, samples=echo.samples - _source_echo(echo, place))
-    return echo, strongest
-
-
-def _all_around(
-    echo: Echo,
-) -> tuple[Float[np.ndarray, "ranges sines 3"], Float[np.ndarray, " sines"]]:
-    """Return the pixels in all directions that are imaged at all, and their sines."""
-    resolution = echo_resolution(echo)
-    nearest, farthest = echo_reach(echo)
-    ranges = np.arange(nearest, farthest, STEP * resolution.along_ray)[:, None]
-    count = 2 * int(np.ceil(WIDEST_SINE / (STEP * resolution.across_ray))) + 1
-    sines = np.linspace(-WIDEST_SINE, WIDEST_SINE, count)
-    return sector_points(ranges, sines), sines
+        echo, image = replace(echo, samples=echo.samples - _source_echo(echo, place)), None
+    if dominant:
+        prepared = PreparedEcho(echo)
+    return Cleaned(
+        prepared=prepared, strongest=strongest, image=None if image is None else image[:, within]
+    )
 
 
 def _source_echo(

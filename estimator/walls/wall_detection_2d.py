@@ -9,11 +9,9 @@ from jaxtyping import Bool, Float
 from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
-from estimator.array.windows import survey_weights
 from estimator.geometry.wall_2d import crossing
-from estimator.imaging.backprojection import prepare
 from estimator.imaging.focusing import Focus, focus_within
-from estimator.imaging.range_compression import range_profiles
+from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import REFLECTED, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines
@@ -86,7 +84,9 @@ LEAST_CELLS = 8.0
 (:data:`estimator.walls.line_sampling.CELLS_CUT`), and four are left to tell an angle. [cells]"""
 
 
-def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
+def detect_mirrors(
+    echo: Echo, looked: Survey, *, prepared: PreparedEcho | None = None
+) -> tuple[FittedLine, ...]:
     """Find the walls that the image shows; the strongest first.
 
     Parameters
@@ -95,6 +95,8 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         In the array's frame.
     looked
         Its survey.
+    prepared
+        The echo, if it was looked at before.
 
     Returns
     -------
@@ -111,10 +113,8 @@ def detect_mirrors(echo: Echo, looked: Survey) -> tuple[FittedLine, ...]:
         *find_ridges(looked, one_wave, coarse),
     ]
     farthest = echo_reach(echo)[1]
-    plain, tapered = (
-        focus_within(prepare(range_profiles(echo, weights=weights)), farthest)
-        for weights in (None, survey_weights(echo))
-    )
+    ready = PreparedEcho(echo) if prepared is None else prepared
+    plain, tapered = (focus_within(one, farthest) for one in (ready.plain, ready.tapered))
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
     certain, doubtful = _fitted(echo, looked, candidates, plain, tapered)
     lines = [line for line in _best_of(certain, coarse) if not is_edge_on(line, half)]

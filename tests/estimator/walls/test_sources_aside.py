@@ -9,6 +9,7 @@ from jaxtyping import Float
 from estimator.array.linear_array import imaged_sine
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
+from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import survey
 from estimator.measurement.model import Echo
 from estimator.walls.sources_aside import without_sources_aside
@@ -50,7 +51,8 @@ def test_a_flash_beyond_the_sector_goes_with_its_lobes_and_what_is_within_stays(
     assert imaged_sine(measured) < 0.55
     lobes = survey(measured).peaks
     assert np.sum(np.abs(np.linalg.norm(lobes, axis=1) - 0.3) < 0.03) > 3
-    cleaned, brightest = without_sources_aside(measured)
+    found = without_sources_aside(PreparedEcho(measured))
+    cleaned, brightest = found.prepared.echo, found.strongest
     assert brightest == pytest.approx(level(measured, OUTSIDE) ** 2, rel=0.5)
     (peak, *others) = survey(cleaned).peaks
     assert np.linalg.norm(peak - INSIDE) < 2e-3
@@ -62,11 +64,12 @@ def test_a_flash_beyond_the_sector_goes_with_its_lobes_and_what_is_within_stays(
 
 def test_a_source_within_the_sector_loses_nothing_to_its_own_lobes() -> None:
     measured = echo([INSIDE, polar(0.33, 0.35)], [1.0, 100.0])
-    cleaned, brightest = without_sources_aside(measured)
+    found = without_sources_aside(PreparedEcho(measured))
+    cleaned, brightest = found.prepared.echo, found.strongest
     assert brightest == 0
     np.testing.assert_array_equal(cleaned.samples, measured.samples)
 
 
 def test_an_array_without_grating_lobes_keeps_its_echo() -> None:
     measured = echo([INSIDE, OUTSIDE], [1.0, 100.0], spacing=0.25e-3)
-    assert without_sources_aside(measured)[0] is measured
+    assert without_sources_aside(PreparedEcho(measured)).prepared.echo is measured
