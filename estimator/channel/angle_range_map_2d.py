@@ -1,12 +1,16 @@
 r"""The spherical-wave matched filter of one user's pilot, over angle and path length."""
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution import HALF_POWER
-from estimator.imaging.backprojection import focus_uplink
-from estimator.imaging.range_compression import unambiguous_path
+from estimator.imaging.backprojection import focus_uplink, prepare
+from estimator.imaging.factorised.parts import PolarGrid
+from estimator.imaging.factorised.polar_image import focus_polar
+from estimator.imaging.range_compression import range_profiles, unambiguous_path
 from estimator.measurement.model import MeasurementError, Uplink
 from estimator.results.estimate import AngleRangeMap
 
@@ -19,7 +23,10 @@ DECIMALS = 9
 """Decimals to which places along the axis are told apart: a nanometre is rounding. [decimals of m]
 """
 SHORTEST = 1e-9
-"""Least length of a vector that has a direction. [-]"""
+"""Least length of a vector that has a direction, and difference of cosines that is no rounding.
+[-]"""
+FEWEST = 64
+"""Angles, and lengths, from which on a map is worth to be formed of parts of the array. [-]"""
 
 
 def angle_range_map(
@@ -64,15 +71,36 @@ def angle_range_map(
         If a path length is beyond the unambiguous one or not positive, an angle is outside
         0…π, or axis and boresight span no plane.
     """
-    points = polar_points(
+    middle = uplink.positions.mean(axis=0) if centre is None else centre
+    points = partial(
+        polar_points,
         aoa=aoa,
         path_length=path_length,
-        centre=uplink.positions.mean(axis=0) if centre is None else centre,
+        centre=middle,
         axis=axis,
         boresight=boresight,
     )
-    values = focus_uplink(uplink, points, amplitude_ratio=amplitude_ratio)
+    grid = None if amplitude_ratio else _uniform(aoa, path_length)
+    if grid is None:
+        values = focus_uplink(uplink, points(), amplitude_ratio=amplitude_ratio)
+    else:
+        _ = points(aoa=aoa[:1], path_length=path_length[:1])  # refuses what makes no map
+        ready = prepare(range_profiles(uplink))
+        values = focus_polar(ready, grid, centre=middle, axis=_unit("axis", axis)).T[::-1].copy()
     return AngleRangeMap(values=values, aoa=aoa, path_length=path_length, user=uplink.user)
+
+
+def _uniform(
+    aoa: Float[np.ndarray, " angles"], path_length: Float[np.ndarray, " ranges"]
+) -> PolarGrid | None:
+    """Return rising lengths and falling cosines as a grid, if the cosines are equally spaced."""
+    cosines = np.cos(aoa)
+    if aoa.size < FEWEST or path_length.size < FEWEST or not path_length[0] > 0:
+        return None
+    uniform = np.linspace(cosines[-1], cosines[0], aoa.size)
+    if np.abs(cosines[::-1] - uniform).max() > SHORTEST or np.any(np.diff(path_length) <= 0):
+        return None
+    return PolarGrid(path_length, uniform)
 
 
 def polar_points(

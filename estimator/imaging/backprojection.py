@@ -243,7 +243,16 @@ def _focus(
         point = [dr.gather(arrays.Float64, axis, index) for axis in coordinates]
         groups.append(_point_state(arrays, point, focuser.legs, per_cell))
     table: ProfileTable = focuser.fine if is_worth_it(profiles, count) else focuser.cubic
-    sums = _sum_over_channels(arrays, focuser, table, groups, per_cell, turns, amplitude_ratio)
+    sums = sum_over_channels(
+        arrays,
+        table,
+        focuser.legs,
+        groups,
+        per_cell,
+        turns,
+        channels=(0, len(profiles.coefficients)),
+        amplitude_ratio=amplitude_ratio,
+    )
 
     norm = dr.opaque(arrays.Float64, table.scale / profiles.gain)
     channels = dr.opaque(arrays.Float64, len(profiles.coefficients))
@@ -278,9 +287,14 @@ def _point_state(
             for axis in leg.axes
         ]
         states.append(tuple(arrays.Float(value) for value in (distance, square, *twice)))
+    return point_state(arrays, states, cells)
+
+
+def point_state(arrays: Any, legs: list[tuple[Any, ...]], cells: Any) -> dict[str, Any]:
+    """Keep what a point needs in the loop: of each leg, and the path to the centre in cells."""
     whole = dr.round(cells)
     return {
-        "legs": states,
+        "legs": legs,
         "cells": cells,
         "cell": arrays.Int32(whole),
         "fraction": arrays.Float(cells - whole),
@@ -291,17 +305,41 @@ def _opaque(arrays: Any, value: float) -> Any:
     return dr.opaque(arrays.Float64, float(value))
 
 
-def _sum_over_channels(
+def sum_over_channels(
     arrays: Any,
-    focuser: Focuser,
     table: ProfileTable,
+    legs: tuple[Leg, ...],
     groups: list[dict[str, Any]],
     per_cell: Any,
     turns: Any,
-    amplitude_ratio: bool,
+    *,
+    channels: tuple[int, int],
+    amplitude_ratio: bool = False,
 ) -> list[tuple[Any, Any, Any]]:
-    """Add up all channels for each group of points, less the phase to the centre."""
-    end = dr.opaque(arrays.UInt32, len(focuser.profiles.coefficients))
+    """Add up some channels for each group of points, less the phase to the centre.
+
+    Parameters
+    ----------
+    arrays
+        The backend's types.
+    table
+        Profiles of all channels.
+    legs
+        Where they are.
+    groups
+        What :func:`point_state` returned.
+    per_cell, turns
+        Cells for each metre of a leg, and turns of the carrier for each cell.
+    channels
+        The first, and the one after the last.
+    amplitude_ratio
+        As in :func:`focus`.
+
+    Returns
+    -------
+    Real and imaginary parts in the table's scale, and the sums of squared ratios.
+    """
+    end = dr.opaque(arrays.UInt32, channels[1])
     stride = dr.opaque(arrays.UInt32, table.cells)
     scale, turns = arrays.Float(per_cell), arrays.Float(turns)
     # A point on an antenna at the centre has 0/0 here; its path difference is 0 then.
@@ -309,8 +347,7 @@ def _sum_over_channels(
 
     def add_channel(channel: Any, row: Any, *sums: Any) -> tuple[Any, ...]:
         ends = [
-            [dr.gather(arrays.Float, axis, channel) for axis in leg.coordinates]
-            for leg in focuser.legs
+            [dr.gather(arrays.Float, axis, channel) for axis in leg.coordinates] for leg in legs
         ]
         totals = []
         for group, (re, im, weight) in zip(groups, _by_three(sums), strict=True):
@@ -338,7 +375,8 @@ def _sum_over_channels(
 
     width = dr.width(groups[0]["cells"])
     zeros = [dr.zeros(arrays.Float, width) for _ in range(3 * len(groups))]
-    start = (arrays.UInt32(0), arrays.UInt32(0), *zeros)
+    first = dr.opaque(arrays.UInt32, channels[0])
+    start = (arrays.UInt32(first), first * stride, *zeros)
     _, _, *sums = dr.while_loop(start, lambda channel, *_: channel < end, add_channel)
     return _by_three(sums)
 

@@ -12,6 +12,7 @@ from estimator.array.viewpoint import Viewpoint, viewpoint
 from estimator.array.windows import Window, aperture_taper, frequency_taper
 from estimator.imaging.angular_spectrum import angular_spectrum
 from estimator.imaging.energy_region import Box, cells_at, energy_box, focused, middles
+from estimator.imaging.factorised.any_points import factorised_backproject, suits_factorising
 from estimator.imaging.range_migration import is_lattice, range_migration, suits_range_migration
 from estimator.measurement.model import Echo, Measurement, MeasurementError
 from estimator.results.estimate import Image
@@ -25,7 +26,8 @@ MOST_PIXELS = {2: 2_000_000, 3: 6_000_000}
 """Most pixels of a plane or a volume; the spacing grows beyond. [-]"""
 MOST_SUMS = 3e9
 """Pixels times positions up to which the image is back-projected, about ten seconds on two cores;
-beyond, range migration forms it where the aperture is a grid. [-]"""
+beyond, range migration forms it where the aperture is a grid, factorised back-projection where it
+is a line. [-]"""
 FEW = 128
 """Frequencies up to which a planar scan's image is summed frequency by frequency, in little memory:
 of few ones range migration interpolates the spectrum badly. Of more it is faster. [-]"""
@@ -271,6 +273,9 @@ def scene_values(
             return angular_spectrum(echo, grid, weights=weights), "the angular spectrum"
         if suits_range_migration(echo, grid):
             return range_migration(echo, grid, weights=weights).reshape(shape), "range migration"
+        if suits_factorising(echo, grid.points):
+            image = factorised_backproject(echo, grid.points, weights=weights)
+            return image.reshape(shape), "factorised back-projection"
     return focused(echo, grid.points.reshape(*shape, 3), weights), "back-projection"
 
 

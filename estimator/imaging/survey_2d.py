@@ -8,7 +8,8 @@ from jaxtyping import Bool, Complex, Float
 from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
-from estimator.imaging.backprojection import focus
+from estimator.imaging.factorised.parts import PolarGrid
+from estimator.imaging.factorised.polar_image import focus_polar
 from estimator.imaging.peak_detection import image_contrast, mean_background, significant_peaks
 from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
 from estimator.imaging.prepared_echo import PreparedEcho
@@ -85,7 +86,7 @@ def survey(
     points = sector_points(ranges[:, None], sines)
     taper = survey_weights(echo)
     if values is None:
-        values = focus(ready.tapered, points)
+        values = focus_sector(ready, ranges, sines)
     peaks = significant_peaks(np.abs(values) ** 2, points)
     untapered = ready.plain.profiles
     tried = bent_intensities(untapered, peaks, resolution)
@@ -131,6 +132,14 @@ def survey_grid(
     step = limit / int(np.ceil(limit / (STEP * resolution.across_ray)))
     half = int(np.floor(widest / step + WHOLE))
     return ranges, step * np.arange(-half, half + 1)
+
+
+def focus_sector(
+    prepared: PreparedEcho, ranges: Float[np.ndarray, " ranges"], sines: Float[np.ndarray, " sines"]
+) -> Complex[np.ndarray, "ranges sines"]:
+    """Focus the tapered echo on ranges [m] and sines before a linear array. [-]."""
+    grid = PolarGrid(ranges, sines)
+    return focus_polar(prepared.tapered, grid, centre=np.zeros(3), axis=np.array([1.0, 0.0, 0.0]))
 
 
 def sector_points(

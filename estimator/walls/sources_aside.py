@@ -26,10 +26,9 @@ from scipy.linalg import cho_solve
 from scipy.ndimage import maximum_filter, maximum_filter1d
 
 from estimator.array.linear_array import WIDEST_SINE, echo_resolution, imaged_sine
-from estimator.imaging.backprojection import focus
 from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.prepared_echo import PreparedEcho
-from estimator.imaging.survey_2d import STEP, sector_points, survey_grid
+from estimator.imaging.survey_2d import STEP, focus_sector, sector_points, survey_grid
 from estimator.measurement.model import Echo
 from estimator.walls.scatterer_row import (
     adjoint,
@@ -100,7 +99,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     strongest = 0.0
     image = None
     for _ in range(MOST_SOURCES):
-        image = focus(prepared.tapered, points)
+        image = focus_sector(prepared, ranges, sines)
         intensity = np.abs(image) ** 2
         # The lobe of what is within the sector is weaker than that.
         shadow = maximum_filter1d(intensity[:, within].max(axis=1), 2 * rows + 1)
