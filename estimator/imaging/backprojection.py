@@ -5,8 +5,9 @@ relative to the array's centre, where :math:`r_m - R = (q^2 - 2 p \cdot q) / (r_
 cancellation, and what is common to all channels is applied once per point in float64.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import drjit as dr
@@ -246,11 +247,11 @@ def _focus(
     sums = sum_over_channels(
         arrays,
         table,
-        focuser.legs,
         groups,
         per_cell,
         turns,
-        channels=(0, len(profiles.coefficients)),
+        places=partial(_places, arrays, focuser.legs),
+        channels=(0, dr.opaque(arrays.UInt32, len(profiles.coefficients))),
         amplitude_ratio=amplitude_ratio,
     )
 
@@ -290,6 +291,10 @@ def _point_state(
     return point_state(arrays, states, cells)
 
 
+def _places(arrays: Any, legs: tuple[Leg, ...], channel: Any) -> list[list[Any]]:
+    return [[dr.gather(arrays.Float, axis, channel) for axis in leg.coordinates] for leg in legs]
+
+
 def point_state(arrays: Any, legs: list[tuple[Any, ...]], cells: Any) -> dict[str, Any]:
     """Keep what a point needs in the loop: of each leg, and the path to the centre in cells."""
     whole = dr.round(cells)
@@ -308,12 +313,12 @@ def _opaque(arrays: Any, value: float) -> Any:
 def sum_over_channels(
     arrays: Any,
     table: ProfileTable,
-    legs: tuple[Leg, ...],
     groups: list[dict[str, Any]],
     per_cell: Any,
     turns: Any,
     *,
-    channels: tuple[int, int],
+    places: Callable[[Any], list[list[Any]]],
+    channels: tuple[Any, Any],
     amplitude_ratio: bool = False,
 ) -> list[tuple[Any, Any, Any]]:
     """Add up some channels for each group of points, less the phase to the centre.
@@ -324,12 +329,12 @@ def sum_over_channels(
         The backend's types.
     table
         Profiles of all channels.
-    legs
-        Where they are.
     groups
         What :func:`point_state` returned.
     per_cell, turns
         Cells for each metre of a leg, and turns of the carrier for each cell.
+    places
+        Returns each leg's coordinates of a channel, from the centre that the points count from.
     channels
         The first, and the one after the last.
     amplitude_ratio
@@ -339,16 +344,13 @@ def sum_over_channels(
     -------
     Real and imaginary parts in the table's scale, and the sums of squared ratios.
     """
-    end = dr.opaque(arrays.UInt32, channels[1])
     stride = dr.opaque(arrays.UInt32, table.cells)
     scale, turns = arrays.Float(per_cell), arrays.Float(turns)
     # A point on an antenna at the centre has 0/0 here; its path difference is 0 then.
     tiny = 1e-30
 
     def add_channel(channel: Any, row: Any, *sums: Any) -> tuple[Any, ...]:
-        ends = [
-            [dr.gather(arrays.Float, axis, channel) for axis in leg.coordinates] for leg in legs
-        ]
+        ends = places(channel)
         totals = []
         for group, (re, im, weight) in zip(groups, _by_three(sums), strict=True):
             shift, ratio = arrays.Float(0), arrays.Float(1)
@@ -375,9 +377,9 @@ def sum_over_channels(
 
     width = dr.width(groups[0]["cells"])
     zeros = [dr.zeros(arrays.Float, width) for _ in range(3 * len(groups))]
-    first = dr.opaque(arrays.UInt32, channels[0])
-    start = (arrays.UInt32(first), first * stride, *zeros)
-    _, _, *sums = dr.while_loop(start, lambda channel, *_: channel < end, add_channel)
+    first = arrays.UInt32(channels[0])
+    start = (first, first * stride, *zeros)
+    _, _, *sums = dr.while_loop(start, lambda channel, *_: channel < channels[1], add_channel)
     return _by_three(sums)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Complex64, Float, Int
 from scipy.constants import speed_of_light
 from scipy.ndimage import spline_filter
 
@@ -82,7 +82,8 @@ def further_distances(
     taper = survey_weights(uplink)
     # Phases over a uniform grid are products of a few: n = inner · a + b.
     inner = int(np.ceil(np.sqrt(count)))
-    padded = np.zeros((len(uplink.positions), inner * inner), dtype=np.complex128)
+    # Phases are reduced to a turn first: single precision leaves the sums 1e-6.
+    padded = np.zeros((len(uplink.positions), inner * inner), dtype=np.complex64)
     padded[:, :count] = uplink.samples * taper
     samples = padded.reshape(-1, inner, inner)
     outer_grid = frequencies[0] + step * inner * np.arange(inner)
@@ -95,14 +96,15 @@ def further_distances(
         turned *= fine[:, None, :]
         return np.asarray(turned.sum(axis=0).ravel()[:count])
 
-    spectra = np.stack([focused(point) for point in points])
+    spectra = np.stack([focused(point) for point in points]).astype(np.complex128)
     size = SAMPLES_PER_CELL * count
     profiles = np.fft.ifft(spectra, size, axis=1)
     return np.abs(profiles) ** 2, speed_of_light / (step * size)
 
 
-def _phasor(turns: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
-    return np.asarray(np.exp(2j * np.pi * (turns - np.rint(turns))))
+def _phasor(turns: Float[np.ndarray, "*n"]) -> Complex64[np.ndarray, "*n"]:
+    left = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+    return np.asarray(np.cos(left) + 1j * np.sin(left), dtype=np.complex64)
 
 
 def wall_anchors(uplink: Uplink, walls: Sequence[SeenWall]) -> Anchors:

@@ -5,10 +5,9 @@ See :mod:`estimator.imaging.factorised.polar_image`.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.constants import speed_of_light
 from scipy.special import i0
 
@@ -49,20 +48,12 @@ class Line:
     wavenumbers: Float[np.ndarray, " 3"]  # first, carrier's, last; of a length one way [rad/m]
 
 
-@dataclass(frozen=True)
-class Part:
-    """Neighbouring channels."""
-
-    first: int
-    last: int  # the one after
-    centre: float  # along the array [m]
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Parts for a range of distances, with the step of the sines on which each is imaged."""
 
-    parts: tuple[Part, ...]
+    edges: Int[np.ndarray, " edges"]  # the first channel of each part, and the one after the last
+    centres: Float[np.ndarray, " parts"]  # along the array [m]
     steps: Float[np.ndarray, " parts"]
     taps: int  # half the coarse sines that a fine one is interpolated from
     sines: Float[np.ndarray, " fine"]
@@ -72,7 +63,7 @@ class Plan:
         """Work at a pixel, over that of one channel; less that of the calls. [-]."""
         columns = self.sines.size
         coarse = float(np.ptp(self.sines)) / self.steps + 2 * self.taps
-        channels = np.array([part.last - part.first for part in self.parts])
+        channels = np.diff(self.edges)
         together = np.minimum(coarse, COLUMNS * coarse / columns + 2 * self.taps)
         return float(np.sum(channels * coarse / columns + OF_A_SUM + OF_A_TAP * together))
 
@@ -144,18 +135,21 @@ def cheapest_plan(focuser: Focuser, line: Line, grid: PolarGrid, error: float) -
         if 2 * count > len(line.along):
             break
         edges = np.linspace(0, len(line.along), count + 1).round().astype(int)
-        parts = tuple(
-            Part(int(a), int(b), float(line.along[a:b].mean())) for a, b in pairwise(edges)
-        )
-        steps = _steps(line, grid, parts)
-        plan = Plan(parts, steps, kaiser_taps(error, OVERSAMPLING), grid.sines)
+        centres = np.add.reduceat(line.along, edges[:-1]) / np.diff(edges)
+        steps = _steps(line, grid, edges, centres)
+        plan = Plan(edges, centres, steps, kaiser_taps(error, OVERSAMPLING), grid.sines)
         cost = plan.cost + count * OF_A_CALL / (grid.sines.size * grid.ranges.size)
         if cost < least and _is_readable(focuser, line, grid, plan):
             best, least = plan, cost
     return best
 
 
-def _steps(line: Line, grid: PolarGrid, parts: tuple[Part, ...]) -> Float[np.ndarray, " parts"]:
+def _steps(
+    line: Line,
+    grid: PolarGrid,
+    edges: Int[np.ndarray, " edges"],
+    centres: Float[np.ndarray, " parts"],
+) -> Float[np.ndarray, " parts"]:
     """Return the step of the sines that sample each part's image."""
     ranges = grid.ranges[[0, -1], None]
     sines = np.linspace(grid.sines[0], grid.sines[-1], PROBES)
@@ -165,8 +159,8 @@ def _steps(line: Line, grid: PolarGrid, parts: tuple[Part, ...]) -> Float[np.nda
         length = np.sqrt(np.maximum(ranges**2 - 2 * ranges * sines * place + place**2, FLAT**2))
         return np.asarray(-ranges * place / length)
 
-    own = line.wavenumbers[1] * slopes(np.array([part.centre for part in parts]))
-    ends = [line.along[[one.first for one in parts]], line.along[[one.last - 1 for one in parts]]]
+    own = line.wavenumbers[1] * slopes(centres)
+    ends = line.along[edges[:-1]], line.along[edges[1:] - 1]
     beside = [k * slopes(end) - own for k in line.wavenumbers[[0, 2]] for end in ends]
     return np.asarray(np.pi / (np.abs(beside).max(axis=(0, 2, 3)) * OVERSAMPLING))
 

@@ -23,12 +23,11 @@ References
        Conference 1999, doi:10.1109/NRC.1999.767270
 """
 
-from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from estimator.compute import engine
@@ -38,12 +37,11 @@ from estimator.compute.sincos import sincos_of_turns
 from estimator.imaging.backprojection import (
     POINTS_PER_LANE,
     Focuser,
-    Leg,
     focus,
     point_state,
     sum_over_channels,
 )
-from estimator.imaging.factorised.parts import Line, Part, Plan, PolarGrid, cheapest_plan, line_of
+from estimator.imaging.factorised.parts import Line, Plan, PolarGrid, cheapest_plan, line_of
 from estimator.imaging.profile_tables import ProfileTable, is_worth_it
 from estimator.imaging.unambiguous_points import refuse_points_out_of_range
 
@@ -125,20 +123,23 @@ def _sum_of_parts(
     image = np.empty((grid.ranges.size, grid.sines.size), dtype=np.complex128)
     worth = is_worth_it(focuser.profiles, image.size)
     table: ProfileTable = focuser.fine if worth else focuser.cubic
-    whole = Part(0, len(line.along), 0.0)
+    everything = np.array([0, len(line.along)])
     first = 0
     while first < grid.ranges.size:
         farthest = DEEPEST * float(grid.ranges[first])
         zone = slice(first, max(first + 1, int(np.searchsorted(grid.ranges, farthest))))
         first = zone.stop
         plan = cheapest_plan(focuser, line, PolarGrid(grid.ranges[zone], grid.sines), error)
-        held = 1 if plan is None else len(plan.parts)
+        held = 1 if plan is None else len(plan.centres)
         step = max(1, MOST_VALUES // (held * grid.sines.size))
         for start in range(zone.start, zone.stop, step):
             rows = slice(start, min(start + step, zone.stop))
             some = PolarGrid(grid.ranges[rows], grid.sines)
             if plan is None:
-                sums = _part_image(focuser, table, line, whole, some)[..., : grid.sines.size]
+                own = _part_images(
+                    focuser, table, line, some.ranges, [grid.sines], everything, np.zeros(1)
+                )
+                sums = own[..., : grid.sines.size]
             else:
                 sums = _interpolated(focuser, table, line, plan, some)
             image.real[rows], image.imag[rows] = sums
@@ -151,51 +152,76 @@ def _interpolated(
 ) -> Float[np.ndarray, "2 ranges sines"]:
     """Form each part's image on coarse sines, interpolate it, turn it and add it."""
     rows = 2 * grid.ranges.size
-    fine = np.empty((len(plan.parts), rows, grid.sines.size), dtype=np.float32)
-    for part, sines, some, out in zip(
-        plan.parts, plan.coarse, plan.interpolators, fine, strict=True
-    ):
-        own = _part_image(focuser, table, line, part, PolarGrid(grid.ranges, sines))
-        values = own.reshape(rows, -1)
+    fine = np.empty((len(plan.centres), rows, grid.sines.size), dtype=np.float32)
+    own = _part_images(
+        focuser, table, line, grid.ranges, plan.coarse, plan.edges, plan.centres
+    ).reshape(rows, -1)
+    first = 0
+    for sines, some, out in zip(plan.coarse, plan.interpolators, fine, strict=True):
+        values = own[:, first : first + sines.size]
+        first += _padded(sines.size)
         for coarse, wanted, weights in some:
             np.matmul(values[:, coarse], weights, out=out[:, wanted])
-    return _turned_sum(fine, line, plan.parts, grid)
+    return _turned_sum(fine, line, plan.centres, grid)
 
 
-def _part_image(
+def _padded(count: int) -> int:
+    """Round up to a whole number of lanes."""
+    return -(-count // POINTS_PER_LANE) * POINTS_PER_LANE
+
+
+def _part_images(
     focuser: Focuser,
     table: ProfileTable,
     line: Line,
-    part: Part,
-    grid: PolarGrid,
+    ranges: Float[np.ndarray, " ranges"],
+    sines: list[Float[np.ndarray, " _"]],
+    edges: Int[np.ndarray, " edges"],
+    centres: Float[np.ndarray, " parts"],
 ) -> Float[np.ndarray, "2 ranges padded"]:
-    """Add up a part's channels, less the carrier's phase to its centre: real and imaginary."""
+    """Add up each part's channels, less the carrier's phase to its centre, on sines of its own.
+
+    Returns
+    -------
+    Real and imaginary parts; beside each other the parts' sines, each rounded up to whole lanes.
+    """
     arrays = engine.arrays()
-    profiles, ranges, sines = focuser.profiles, grid.ranges, grid.sines
-    columns = -(-sines.size // POINTS_PER_LANE)
-    lane = dr.arange(arrays.UInt32, ranges.size * columns)
-    row, column = row_and_column(lane, columns)
-    by_column = arrays.Float(np.pad(sines, (0, POINTS_PER_LANE)).astype(np.float32))
+    profiles = focuser.profiles
+    lanes = [_padded(some.size) // POINTS_PER_LANE for some in sines]
+    columns = sum(lanes)
+    row, column = row_and_column(dr.arange(arrays.UInt32, ranges.size * columns), columns)
+    by_column = arrays.Float(
+        np.concatenate(
+            [np.pad(some, (0, _padded(some.size) - some.size), mode="edge") for some in sines]
+        ).astype(np.float32)
+    )
+    middle = dr.gather(
+        arrays.Float, arrays.Float(np.repeat(centres, lanes).astype(np.float32)), column
+    )
+    first, after = (
+        dr.gather(arrays.UInt32, arrays.UInt32(np.repeat(edge, lanes).astype(np.uint32)), column)
+        for edge in (edges[:-1], edges[1:])
+    )
     reach = dr.gather(arrays.Float, arrays.Float(ranges.astype(np.float32)), row)
     per_cell = dr.opaque(arrays.Float, profiles.passes / profiles.cell)
     turns = dr.opaque(arrays.Float, profiles.carrier * profiles.cell / speed_of_light)
-    middle = dr.opaque(arrays.Float, part.centre)
     # The carrier's phase is that of path differences alone: float32 is enough for the rest.
     groups = []
     for i in range(POINTS_PER_LANE):
-        place = POINTS_PER_LANE * column + i
-        x = reach * dr.gather(arrays.Float, by_column, place)
+        x = reach * dr.gather(arrays.Float, by_column, POINTS_PER_LANE * column + i)
         square = dr.fma(middle, middle - 2 * x, reach * reach)
         distance = dr.sqrt(square)
         states = [(distance, square, 2 * (x - middle))]
         groups.append(point_state(arrays, states, distance * per_cell))
-    leg = replace(
-        focuser.legs[0],
-        coordinates=(arrays.Float((line.along - part.centre).astype(np.float32)),),
-    )
-    legs: tuple[Leg, ...] = (leg,)
+    along = arrays.Float(line.along.astype(np.float32))
     sums = sum_over_channels(
-        arrays, table, legs, groups, per_cell, turns, channels=(part.first, part.last)
+        arrays,
+        table,
+        groups,
+        per_cell,
+        turns,
+        places=lambda channel: [[dr.gather(arrays.Float, along, channel) - middle]],
+        channels=(first, after),
     )
     dr.eval(sums)  # together: one kernel
     image = np.empty((2, ranges.size * columns, POINTS_PER_LANE), dtype=np.float32)
@@ -208,14 +234,14 @@ def _part_image(
 def _turned_sum(
     fine: Float[np.ndarray, "parts rows columns"],
     line: Line,
-    parts: tuple[Part, ...],
+    centres: Float[np.ndarray, " parts"],
     grid: PolarGrid,
 ) -> Float[np.ndarray, "2 ranges sines"]:
     """Add the parts' images with the carrier's phase from the centre of each to the array's."""
     arrays: Any = engine.arrays()
     count = grid.ranges.size * grid.sines.size
     source = arrays.Float(fine.ravel())
-    centres = arrays.Float(np.array([part.centre for part in parts], dtype=np.float32))
+    middles = arrays.Float(centres.astype(np.float32))
     lane = dr.arange(arrays.UInt32, count)
     row, column = row_and_column(lane, grid.sines.size)
     reach = dr.gather(arrays.Float64, arrays.Float64(grid.ranges), row)
@@ -223,10 +249,10 @@ def _turned_sum(
     double, square = arrays.Float(2 * x), arrays.Float(reach * reach)
     distance = arrays.Float(reach)
     per_metre = dr.opaque(arrays.Float, line.wavenumbers[1] / (2 * np.pi))
-    end, size = dr.opaque(arrays.UInt32, len(parts)), dr.opaque(arrays.UInt32, count)
+    end, size = dr.opaque(arrays.UInt32, centres.size), dr.opaque(arrays.UInt32, count)
 
     def add_part(part: Any, place: Any, re: Any, im: Any) -> tuple[Any, ...]:
-        centre = dr.gather(arrays.Float, centres, part)
+        centre = dr.gather(arrays.Float, middles, part)
         excess = centre * (centre - double)
         length = dr.sqrt(dr.maximum(square + excess, 0.0))
         sine, cosine = sincos_of_turns(excess / (distance + length) * per_metre)
