@@ -68,27 +68,32 @@ def point_profiles(
     turn = np.exp(1j * sweep.count * per_range * ranges)
     carrier = np.exp(-1j * wavenumber * ranges) / np.sqrt(sweep.count)
     sign = np.cos(sweep.count * per_range * bins)
+    # The sine of a difference from those of both sides: exact to 1e-16, on a bin to 1e-9 of 1.
+    at_point, at_bin = np.exp(1j * per_range * ranges), np.exp(1j * per_range * bins)
     of_point = [
         arrays.Float64(np.ascontiguousarray(table, dtype=np.float64).ravel())
-        for table in (ranges, turn.real, turn.imag, carrier.real, carrier.imag, rates)
+        for part in (at_point, turn, carrier)
+        for table in (part.real, part.imag)
     ]
-    of_bin = [arrays.Float64(bins), arrays.Float64(sign)]
+    of_point.append(arrays.Float64(np.ascontiguousarray(rates, dtype=np.float64).ravel()))
+    of_bin = [arrays.Float64(table) for table in (at_bin.real, at_bin.imag, sign)]
 
     lanes = positions * bins.size * points
     lane = dr.arange(arrays.UInt32, lanes)
     row, point = row_and_column(lane, points)
     position, column = row_and_column(row, bins.size)
     entry = position * dr.opaque(arrays.UInt32, points) + point
-    length, cosine_n, sine_n, carrier_re, carrier_im, rate = (
+    cosine_p, sine_p, cosine_n, sine_n, carrier_re, carrier_im, rate = (
         dr.gather(arrays.Float64, table, entry) for table in of_point
     )
-    bin_range, turned = (dr.gather(arrays.Float64, table, column) for table in of_bin)
+    cosine_b, sine_b, turned = (dr.gather(arrays.Float64, table, column) for table in of_bin)
 
     def opaque(value: float) -> Any:
         return dr.opaque(arrays.Float64, value)
 
     scale, count = opaque(per_range), opaque(float(sweep.count))
-    sine, cosine = dr.sincos((bin_range - length) * scale)
+    sine = dr.fma(sine_b, cosine_p, -cosine_b * sine_p)
+    cosine = dr.fma(cosine_b, cosine_p, sine_b * sine_p)
     on_bin = abs(sine) < ON_BIN
     inverse = 1 / dr.select(on_bin, 1.0, sine)
     kernel = dr.select(on_bin, count, -turned * sine_n * inverse)
