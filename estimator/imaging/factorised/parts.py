@@ -141,6 +141,8 @@ def cheapest_plan(focuser: Focuser, line: Line, grid: PolarGrid, error: float) -
         cost = plan.cost + count * OF_A_CALL / (grid.sines.size * grid.ranges.size)
         if cost < least and _is_readable(focuser, line, grid, plan):
             best, least = plan, cost
+        elif best is not None:
+            break  # ever more parts cost ever more
     return best
 
 
