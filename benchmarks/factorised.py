@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.backprojection import decibels, echo_of_targets
 from estimator.compute import engine
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.factorised.any_points import factorised_backproject
+from estimator.imaging.factorised import factorised_backproject
 from estimator.measurement.model import Echo
 from estimator.results.pixel_grid import PixelGrid
 

@@ -7,9 +7,9 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution import HALF_POWER
+from estimator.imaging.aperture_parts import PolarGrid
 from estimator.imaging.backprojection import focus_uplink, prepare
-from estimator.imaging.factorised.parts import PolarGrid
-from estimator.imaging.factorised.polar_image import focus_polar
+from estimator.imaging.polar_image import focus_polar
 from estimator.imaging.range_compression import range_profiles, unambiguous_path
 from estimator.measurement.model import MeasurementError, Uplink
 from estimator.results.estimate import AngleRangeMap

@@ -1,5 +1,5 @@
 from .backprojection import backproject, focus, focus_uplink, prepare
-from .factorised.any_points import factorised_backproject
+from .factorised import factorised_backproject
 from .focusing import Focus, focus_within
 from .peak_detection import mean_background
 from .range_compression import RangeProfiles, range_profiles, unambiguous_path

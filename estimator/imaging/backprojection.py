@@ -25,8 +25,11 @@ from estimator.imaging.profile_tables import (
     fine_table,
     is_worth_it,
 )
-from estimator.imaging.range_compression import RangeProfiles, range_profiles
-from estimator.imaging.unambiguous_points import refuse_points_out_of_range
+from estimator.imaging.range_compression import (
+    RangeProfiles,
+    range_profiles,
+    refuse_points_out_of_range,
+)
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 
 POINTS_PER_LANE = 4

@@ -8,11 +8,11 @@ from jaxtyping import Bool, Complex, Float
 from estimator.array.linear_array import echo_reach, echo_resolution, imaged_sine
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.array.windows import SURVEY_TAPER, frequency_taper, survey_weights
-from estimator.imaging.factorised.parts import PolarGrid
-from estimator.imaging.factorised.polar_image import focus_polar
+from estimator.imaging.aperture_parts import PolarGrid
+from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.peak_detection import image_contrast, mean_background, significant_peaks
 from estimator.imaging.phase_curvature import bent_intensities, coherence_factor
-from estimator.imaging.prepared_echo import PreparedEcho
+from estimator.imaging.polar_image import focus_polar
 from estimator.imaging.range_alias import FocusByRange, focus_by_range
 from estimator.measurement.model import Echo
 

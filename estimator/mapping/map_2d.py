@@ -8,8 +8,8 @@ from jaxtyping import Float
 from estimator.array.array_frame import ArrayFrame
 from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import Wall
+from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.peak_detection import image_contrast
-from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.target_detection import find_targets
 from estimator.mapping.wall_unfolding import unfold_seen_lines

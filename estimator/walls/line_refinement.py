@@ -8,8 +8,7 @@ from jaxtyping import Float
 
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
-from estimator.imaging.focusing import Focus, focus_within
-from estimator.imaging.prepared_echo import PreparedEcho
+from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
 from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine

@@ -26,8 +26,8 @@ from scipy.linalg import cho_solve
 from scipy.ndimage import maximum_filter, maximum_filter1d
 
 from estimator.array.linear_array import WIDEST_SINE, echo_resolution, imaged_sine
+from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.peak_detection import mean_background
-from estimator.imaging.prepared_echo import PreparedEcho
 from estimator.imaging.survey_2d import STEP, focus_sector, sector_points, survey_grid
 from estimator.measurement.model import Echo
 from estimator.walls.scatterer_row import (

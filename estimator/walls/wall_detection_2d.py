@@ -10,8 +10,7 @@ from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing
-from estimator.imaging.focusing import Focus, focus_within
-from estimator.imaging.prepared_echo import PreparedEcho
+from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
 from estimator.imaging.survey_2d import REFLECTED, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines

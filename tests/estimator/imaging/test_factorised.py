@@ -3,10 +3,10 @@ import pytest
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator.imaging.aperture_parts import PolarGrid, cheapest_plan, line_of
 from estimator.imaging.backprojection import backproject, focus, prepare
-from estimator.imaging.factorised.any_points import factorised_backproject
-from estimator.imaging.factorised.parts import PolarGrid, cheapest_plan, line_of
-from estimator.imaging.factorised.polar_image import focus_polar, polar_points
+from estimator.imaging.factorised import factorised_backproject
+from estimator.imaging.polar_image import focus_polar, polar_points
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 from estimator.results.pixel_grid import PixelGrid

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from estimator.array.linear_array import imaged_sine
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.prepared_echo import PreparedEcho
+from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.survey_2d import survey
 from estimator.measurement.model import Echo
 from estimator.walls.sources_aside import without_sources_aside

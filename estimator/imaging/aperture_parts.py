@@ -1,6 +1,6 @@
 """Parts of a linear array, and the sines on which their images are sampled.
 
-See :mod:`estimator.imaging.factorised.polar_image`.
+See :mod:`estimator.imaging.polar_image`.
 """
 
 from dataclasses import dataclass

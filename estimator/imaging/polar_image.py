@@ -34,6 +34,7 @@ from estimator.compute import engine
 from estimator.compute.blas_threads import one_blas_thread
 from estimator.compute.integer_division import row_and_column
 from estimator.compute.sincos import sincos_of_turns
+from estimator.imaging.aperture_parts import Line, Plan, PolarGrid, cheapest_plan, line_of
 from estimator.imaging.backprojection import (
     POINTS_PER_LANE,
     Focuser,
@@ -41,9 +42,8 @@ from estimator.imaging.backprojection import (
     point_state,
     sum_over_channels,
 )
-from estimator.imaging.factorised.parts import Line, Plan, PolarGrid, cheapest_plan, line_of
 from estimator.imaging.profile_tables import ProfileTable, is_worth_it
-from estimator.imaging.unambiguous_points import refuse_points_out_of_range
+from estimator.imaging.range_compression import refuse_points_out_of_range
 
 ERROR = 1e-3
 """Error that is allowed by default, over the peak of a point target: -60 dB. [-]"""

@@ -7,7 +7,7 @@ faster than
 .. math:: \psi_R = \max |k_n \partial_R \rho_m - k_c| , \qquad
           \psi_s = \max |k_n \partial_s \rho_m|
 
-(:mod:`estimator.imaging.factorised.polar_image`). It is formed on a polar grid that samples that,
+(:mod:`estimator.imaging.polar_image`). It is formed on a polar grid that samples that,
 from parts of the array, and read from there at each point by a product of two interpolators. Where
 pixels are finer than the resolution, and the array is long, that saves most of the work of
 back-projection.
@@ -23,17 +23,20 @@ from scipy.constants import speed_of_light
 from scipy.special import i0
 
 from estimator.compute import engine
-from estimator.imaging.backprojection import FLAT, Focuser, focus, prepare
-from estimator.imaging.factorised.parts import (
+from estimator.imaging.aperture_parts import (
     Line,
     PolarGrid,
     kaiser_shape,
     kaiser_taps,
     line_of,
 )
-from estimator.imaging.factorised.polar_image import ERROR, focus_polar
-from estimator.imaging.range_compression import range_profiles, unambiguous_path
-from estimator.imaging.unambiguous_points import refuse_points_out_of_range
+from estimator.imaging.backprojection import FLAT, Focuser, focus, prepare
+from estimator.imaging.polar_image import ERROR, focus_polar
+from estimator.imaging.range_compression import (
+    range_profiles,
+    refuse_points_out_of_range,
+    unambiguous_path,
+)
 from estimator.measurement.model import Echo
 
 OVERSAMPLING = 2.5
