@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from estimator.array.linear_array import echo_resolution
 from estimator.array.resolution_cell import coarse_resolution
+from estimator.imaging.focusing import PreparedEcho
 from estimator.mapping import diffuse_multipath
 from estimator.mapping.diffuse_multipath import in_cloud
 from estimator.measurement.model import Echo
@@ -136,10 +137,10 @@ def sources_of_echoes(echoes: Sequence[Echo]) -> list[Row]:
     counts: list[int] = []
     for echo in echoes:
         with patch.object(sources_aside, "_source_echo", wraps=sources_aside._source_echo) as taken:
-            own = without_sources_aside(echo)[0].samples
+            own = without_sources_aside(PreparedEcho(echo)).prepared.echo.samples
         counts.append(taken.call_count)
         with _ample(sources_aside, "MOST_SOURCES"):
-            ample = without_sources_aside(echo)[0].samples
+            ample = without_sources_aside(PreparedEcho(echo)).prepared.echo.samples
         left.append(float(np.linalg.norm(own - ample) ** 2 / np.linalg.norm(echo.samples) ** 2))
     return [
         Row(
