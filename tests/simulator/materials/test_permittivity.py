@@ -33,10 +33,13 @@ def test_plasterboard_conducts_as_the_recommendation_says() -> None:
     assert np.all(values.imag < 0)  # exp(+jwt): loss is a negative imaginary part
 
 
-def test_the_band_chooses_the_row() -> None:
-    assert permittivity.itu_permittivity("plasterboard", np.array([57e9, 64e9])).real == 2.73
-    assert permittivity.itu_permittivity("plasterboard", np.array([110e9, 330e9])).real == 2.56
-    assert permittivity.itu_permittivity("plasterboard", np.array([300e9, 350e9])).real == 2.65
+@pytest.mark.parametrize(
+    ("band", "real"), [((57e9, 64e9), 2.73), ((110e9, 330e9), 2.56), ((300e9, 350e9), 2.65)]
+)
+def test_the_band_chooses_the_row(band: tuple[float, float], real: float) -> None:
+    row = permittivity.itu_permittivity("plasterboard", np.array(band))
+    assert isinstance(row, PowerLawPermittivity)
+    assert row.real == real
 
 
 def test_a_band_that_no_row_covers_is_refused() -> None:
