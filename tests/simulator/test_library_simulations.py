@@ -73,7 +73,7 @@ def cut(name: str, *, points: int, elements: int, most_facets: int) -> list[str]
 
 
 def small(name: str) -> Scenario:
-    return load_scenario(name, cut(name, points=7, elements=4, most_facets=300))
+    return load_scenario(name, cut(name, points=7, elements=5, most_facets=600))
 
 
 @cache

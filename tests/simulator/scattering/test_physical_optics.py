@@ -421,7 +421,7 @@ def test_roughness_takes_the_coherent_loss_from_the_mean_field() -> None:
     # Gaussian heights: the mean field is that of the mean line times exp(-½(k·rms·Q)²), and what
     # waves along the line take, the mean of the small-slope approximation's second order:
     # 1 - ½k²Q·rms²·<q(t_i + ξ) + q(t_s + ξ) - Q> over the heights' spectrum.
-    rms, correlation, draws = 0.12e-3, 0.8e-3, 120
+    rms, correlation, draws = 0.12e-3, 0.8e-3, 240
     smooth = flat_wall(0.2, step=0.2e-3)
     start, end = np.array([[-0.25, -0.25, 0.0]]), np.array([[0.25, -0.25, 0.0]])
     frequencies = np.array([220e9, 257.5e9, 295e9])

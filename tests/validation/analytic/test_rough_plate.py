@@ -67,7 +67,7 @@ def test_the_diffuse_mean_of_the_facets_is_the_kirchhoff_integral(
     material: str, rms_mm: float
 ) -> None:
     scene = small_sample(material, rms_mm=rms_mm)
-    plate, seeds = scene.objects["sample"], 16
+    plate, seeds = scene.objects["sample"], 8
     assert isinstance(plate, Plate)
     assert plate.roughness is not None
     frequencies = scene.radio.frequencies
