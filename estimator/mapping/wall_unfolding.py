@@ -29,6 +29,9 @@ validation.experiments.thresholds answers``: with 1.5 and 6 the answers in three
 are the same: six of six walls found, none false, and four false targets. [cells]"""
 MOST = 0.5
 """Share of a line from which most of it is meant. [-]"""
+NEARER = 0.02
+"""Part of a distance by which a wall must be nearer to stand before another: walls that meet are
+known to a cell or two. [-]"""
 MIXED_SAMPLES = 65
 """Places along a wall whose two views are mixed: closer than the cells of the mixture. [-]"""
 
@@ -59,7 +62,8 @@ def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> Unfolde
 
     Returns
     -------
-    The walls; a line that is another view of a wall is left out.
+    The walls; a line that is another view of a wall is left out, and so is one that cannot be a
+    reflection: what is seen through a pane is later than it is far, by an unknown length.
     """
     kept: list[FittedLine] = []
     walls: list[Wall] = []
@@ -68,6 +72,8 @@ def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> Unfolde
     for line in _from_the_array_outward(lines):
         chain = _chain_before(line, walls)
         unfolding = _unfolded(line, walls, chain)
+        if chain and _stands_in_the_way(line, unfolding, walls, chain, seen):
+            continue  # seen through the other wall, which is a pane
         if chain:
             views.append((line, unfolding, kept[chain[0]]))
         same = any(_is_one(line, unfolding, wall, resolution) for wall in walls)
@@ -159,6 +165,35 @@ def _unfolded(line: FittedLine, walls: Sequence[Wall], chain: Chain) -> Wall:
     for index in chain:
         ends = mirrored(ends, walls[index].start, walls[index].end)
     return Wall(start=ends[0], end=ends[1], covariance=line.covariance)
+
+
+def _stands_in_the_way(
+    line: FittedLine,
+    unfolding: Wall,
+    walls: Sequence[Wall],
+    chain: Chain,
+    seen: Sequence[Chain],
+) -> bool:
+    """Tell whether an unfolded wall would hide its own mirror, or most of what is seen directly."""
+    ways = [(line, walls[chain[0]])]
+    ways += [(wall, wall) for wall, through in zip(walls, seen, strict=True) if not through]
+    return any(
+        np.mean([_is_crossed(point, before, unfolding) for point in _places(along)]) > MOST
+        for along, before in ways
+    )
+
+
+def _places(along: FittedLine | Wall) -> Float[np.ndarray, "places 3"]:
+    shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    return np.asarray(along.start + shares[:, None] * (along.end - along.start))
+
+
+def _is_crossed(point: Float[np.ndarray, " 3"], before: Wall, wall: Wall) -> bool:
+    """Tell whether a wall crosses the ray to a point before the ray meets another wall."""
+    far = float(np.linalg.norm(point))
+    limit = crossing(np.zeros(3), point / far, before.start, before.end)
+    hit = crossing(np.zeros(3), point / far, wall.start, wall.end)
+    return hit is not None and hit[0] < (far if limit is None else limit[0]) * (1 - NEARER)
 
 
 def _is_one(line: FittedLine, unfolding: Wall, other: Wall, resolution: Resolution) -> bool:

@@ -51,6 +51,9 @@ LEAST_LEVEL = 300.0
 NEAR_LOBE = 0.5
 """Distance in range within which the lobe of a source appears, over the aperture: the delays of the
 elements are those of the source's sine, which differs from the lobe's by about 1. [-]"""
+BORDER = 3
+"""Distance beyond the sector within which a source is in it with a part of its lobe, which ends at
+1.4 cells: it is imaged, and no lobe of something else. [pixels]"""
 MOST_OF_IT = 0.5
 """Share of the energy from which a source is fitted once more after the others. [-]"""
 DEPTH_SPACING, SPACING = 0.75, 0.5
@@ -93,6 +96,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     inner = len(survey_grid(echo, limit)[1])
     outer = (len(sines) - inner) // 2
     within = slice(outer, outer + inner)
+    border = slice(max(outer - BORDER, 0), outer + inner + BORDER)
     near = NEAR_LOBE * float(np.ptp(echo.positions[:, 0]))
     rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
     dominant = []
@@ -102,9 +106,9 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
         image = focus_sector(prepared, ranges, sines)
         intensity = np.abs(image) ** 2
         # The lobe of what is within the sector is weaker than that.
-        shadow = maximum_filter1d(intensity[:, within].max(axis=1), 2 * rows + 1)
+        shadow = maximum_filter1d(intensity[:, border].max(axis=1), 2 * rows + 1)
         tops = (intensity == maximum_filter(intensity, size=3)) & (intensity > shadow[:, None])
-        tops[:, within] = False
+        tops[:, border] = False
         brightest = np.argmax(np.where(tops, intensity, 0.0))
         if not intensity.flat[brightest] > LEAST_LEVEL * mean_background(intensity):
             break

@@ -155,3 +155,16 @@ def test_an_unfolded_place_errs_with_the_mirrors_and_with_its_ghost() -> None:
     np.testing.assert_array_equal(
         place_covariance(ghost, own, unfolded.walls, unfolded.covariance, ()), own
     )
+
+
+def test_what_cannot_be_a_reflection_is_seen_through_a_pane() -> None:
+    pane = np.array([[-0.236, 0.198, 0.0], [-0.048, 0.338, 0.0]])
+    behind = np.array([[-0.305, 0.393, 0.0], [-0.104, 0.487, 0.0]])
+    # Unfolded, it would stand across the array's view of the pane itself.
+    unfolded = unfold_lines([line(pane), line(behind)], RESOLUTION)
+    assert len(unfolded.walls) == 1
+    np.testing.assert_allclose(unfolded.walls[0].start, pane[0])
+    # A reflection of what stands beside the view of the mirror is one.
+    beside = np.array([[-0.3, 0.05, 0.0], [-0.22, 0.12, 0.0]])
+    seen = line(image_over(beside, [wall(pane)], (0,)))
+    assert len(unfold_lines([line(pane), seen], RESOLUTION).walls) == 2
