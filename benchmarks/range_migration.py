@@ -14,8 +14,8 @@ from scipy.constants import speed_of_light
 from benchmarks.backprojection import decibels, echo_of_targets, fastest
 from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.compute import engine
-from estimator.imaging import range_migration
 from estimator.imaging.backprojection import backproject
+from estimator.imaging.wavenumber import range_migration
 from estimator.measurement.model import Echo, Uplink
 from estimator.results.pixel_grid import PixelGrid
 

@@ -1,5 +1,5 @@
 from .imaging import backproject, range_profiles
-from .imaging.range_migration import range_migration
+from .imaging.wavenumber.range_migration import range_migration
 from .localization import locate
 from .measurement import (
     Echo,

@@ -29,21 +29,18 @@ def with_modules(markdown: str, root: Path) -> str:
 
 def module_sections(package: Path) -> str:
     """List a package's own modules, then those of each sub-package under what it is for."""
-    sections = [_modules(package)]
-    for folder in sorted(one.parent for one in package.glob("*/__init__.py")):
-        if folder.name in LEFT_OUT.get(package.name, ()):
+    sections = [_modules(package, package.parent)]
+    for folder in sorted(one.parent for one in package.glob("*/**/__init__.py")):
+        if folder.relative_to(package).parts[0] in LEFT_OUT.get(package.name, ()):
             continue
         about = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8"))) or ""
-        sections.append(f"## `{package.name}.{folder.name}`\n\n{about}\n\n{_modules(folder)}")
+        name = ".".join(folder.relative_to(package.parent).parts)
+        sections.append(f"## `{name}`\n\n{about}\n\n{_modules(folder, package.parent)}")
     return "\n".join(sections)
 
 
-def _modules(folder: Path) -> str:
-    name = (
-        f"{folder.parent.name}.{folder.name}"
-        if (folder.parent / "__init__.py").exists()
-        else folder.name
-    )
+def _modules(folder: Path, root: Path) -> str:
+    name = ".".join(folder.relative_to(root).parts)
     return "".join(
         f"::: {name}.{file.stem}\n    options:\n      heading_level: 3\n\n"
         for file in sorted(folder.glob("*.py"))

@@ -10,10 +10,14 @@ from estimator.array.array_frame import ArrayFrame
 from estimator.array.resolution import unaliased_sine
 from estimator.array.viewpoint import Viewpoint, viewpoint
 from estimator.array.windows import Window, aperture_taper, frequency_taper
-from estimator.imaging.angular_spectrum import angular_spectrum
 from estimator.imaging.energy_region import Box, cells_at, energy_box, focused, middles
 from estimator.imaging.factorised import factorised_backproject, suits_factorising
-from estimator.imaging.range_migration import is_lattice, range_migration, suits_range_migration
+from estimator.imaging.wavenumber.angular_spectrum import angular_spectrum
+from estimator.imaging.wavenumber.range_migration import (
+    is_lattice,
+    range_migration,
+    suits_range_migration,
+)
 from estimator.measurement.model import Echo, Measurement, MeasurementError
 from estimator.results.estimate import Image
 from estimator.results.pixel_grid import PixelGrid

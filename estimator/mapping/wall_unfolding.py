@@ -175,7 +175,7 @@ def _stands_in_the_way(
     seen: Sequence[Chain],
 ) -> bool:
     """Tell whether an unfolded wall would hide its own mirror, or most of what is seen directly."""
-    ways = [(line, walls[chain[0]])]
+    ways: list[tuple[FittedLine | Wall, Wall]] = [(line, walls[chain[0]])]
     ways += [(wall, wall) for wall, through in zip(walls, seen, strict=True) if not through]
     return any(
         np.mean([_is_crossed(point, before, unfolding) for point in _places(along)]) > MOST

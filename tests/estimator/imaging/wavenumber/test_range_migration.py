@@ -5,7 +5,7 @@ from scipy.constants import speed_of_light
 
 from estimator.array.windows import Window, aperture_taper, frequency_taper
 from estimator.imaging.backprojection import backproject
-from estimator.imaging.range_migration import range_migration
+from estimator.imaging.wavenumber.range_migration import range_migration
 from estimator.measurement.model import Echo, MeasurementError
 from estimator.results.pixel_grid import PixelGrid
 

@@ -1,15 +1,16 @@
 r"""Planes of an image by the angular spectrum, frequency by frequency: holography.
 
 Each frequency's samples over a planar grid are plane waves; :math:`e^{+j k_y y}` carries them to
-any depth (see :mod:`estimator.imaging.range_migration` for the kernel's transform). Nothing is
-interpolated over frequency, so that few frequencies do, and no range is ambiguous to the method.
+any depth (see :mod:`estimator.imaging.wavenumber.range_migration` for the kernel's transform).
+Nothing is interpolated over frequency, so that few frequencies do, and no range is ambiguous to the
+method.
 """
 
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.imaging.range_migration import at_pixels, over_aperture, transform_axis
+from estimator.imaging.wavenumber.range_migration import at_pixels, over_aperture, transform_axis
 from estimator.measurement.model import Echo
 from estimator.results.pixel_grid import PixelGrid
 
@@ -28,7 +29,7 @@ def angular_spectrum(
     ----------
     echo
         At positions on a grid over x and z, all at one y; a geometry that
-        :func:`estimator.imaging.range_migration.is_lattice` takes.
+        :func:`estimator.imaging.wavenumber.range_migration.is_lattice` takes.
     grid
         Pixels at larger y.
     weights

@@ -22,7 +22,7 @@ from jaxtyping import Complex, Complex64, Float
 from scipy.constants import speed_of_light
 
 from estimator.imaging.range_compression import unambiguous_path
-from estimator.imaging.stolt import (
+from estimator.imaging.wavenumber.stolt import (
     OVERSAMPLING,
     ApertureAxis,
     GatedSpectrum,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from estimator.array.windows import survey_weights
-from estimator.imaging.angular_spectrum import angular_spectrum
 from estimator.imaging.energy_region import cells_at, farthest_told, focused
-from estimator.imaging.range_migration import range_migration
+from estimator.imaging.wavenumber.angular_spectrum import angular_spectrum
+from estimator.imaging.wavenumber.range_migration import range_migration
 from estimator.measurement.model import Echo
 from estimator.results.pixel_grid import PixelGrid
 from validation.analytic.point_scatterer import point_echo
