@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from scipy.constants import speed_of_light
 
 from estimator.imaging.backprojection import backproject, focus_uplink
-from estimator.imaging.range_migration import range_migration
+from estimator.imaging.wavenumber.range_migration import range_migration
 from estimator.results.pixel_grid import PixelGrid
 from validation.analytic.point_scatterer import point_echo, point_uplink
 from validation.experiments import simulator_on_points

@@ -74,7 +74,7 @@ PLANTED = (
     ),
     PlantedError(
         name="missing Jacobian of the Stolt step",
-        file="estimator/imaging/stolt.py",
+        file="estimator/imaging/wavenumber/stolt.py",
         right="weight = dr.select(inside, scale * sector * jacobian, 0.0)",
         wrong="weight = dr.select(inside, scale * sector, 0.0)",
         claims=("image_formers",),
