@@ -19,7 +19,7 @@ from estimator.walls.fitted_line import FittedLine
 
 FACETS = 48
 """Places along a wall over which a cloud's ways are tried, the straight way included: their
-pairs fill the cloud. Of the points in clouds of four times as many, 1.3 % are left out (``python
+pairs fill the cloud. Of the points in clouds of four times as many, 1.1 % are left out (``python
 -m validation.experiments.thresholds limits``); the time grows with the square. [-]"""
 MARGIN = 2.0
 """Range before and behind a cloud, and distance from a mixed echo in range and sine, within which a
