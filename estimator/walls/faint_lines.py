@@ -18,7 +18,7 @@ what most places of that range or direction show, as where only a part of the ar
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.stats import norm
 
 from estimator import false_alarm
@@ -26,7 +26,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.imaging.peak_detection import DYNAMIC_RANGE, peaks_above
 from estimator.imaging.survey_2d import Survey
 from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
-from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, intensity_at, width_of
+from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, width_of
 
 END = 1e-3
 """False-alarm rate of an end: an image has some dozens of such maxima of noise, and what counts is
@@ -80,8 +80,10 @@ def find_faint_lines(
     first, second, cells = first[long], second[long], cells[long]
     if not first.size:
         return ()
-    significance = _significance(looked, over, free, peaks[first], peaks[second], cells, resolution)
     least = float(norm.isf(false_alarm.WALL / first.size))
+    significance = _significance(
+        looked, over, free, peaks[first], peaks[second], cells, least, resolution
+    )
     score = np.where(significance >= least, significance, 0.0)
     found: list[LineCandidate] = []
     while score.max() > 0 and len(found) < MOST_LINES:
@@ -103,6 +105,7 @@ def _significance(
     starts: Float[np.ndarray, "pairs 3"],
     ends: Float[np.ndarray, "pairs 3"],
     cells: Float[np.ndarray, " pairs"],
+    least: float,
     resolution: Resolution,
 ) -> Float[np.ndarray, " pairs"]:
     """Return by how many deviations of noise segments are brighter than it, and than either side.
@@ -119,30 +122,51 @@ def _significance(
         Of the segments. [m]
     cells
         Their lengths. [cells]
+    least
+        Deviations below which the sides of a segment are not asked. [-]
     resolution
         Of the image.
     """
-    cut = (CUT / cells)[:, None]
-    shares = (cut + (1 - 2 * cut) * np.linspace(0, 1, SAMPLES)).T[..., None]
+    clipped = np.minimum(over, CLIP) * free
+
+    def mean_over(places: Float[np.ndarray, "samples some 3"]) -> Float[np.ndarray, " some"]:
+        read = clipped.ravel()[_pixels(looked, places)].sum(axis=0)
+        return np.asarray(read / np.maximum(counts, 1))
+
+    cut = CUT / cells
+    shares = (cut[:, None] + (1 - 2 * cut)[:, None] * np.linspace(0, 1, SAMPLES)).T[..., None]
     places = starts + shares * (ends - starts)
-    along = (ends - starts) / np.linalg.norm(ends - starts, axis=-1, keepdims=True)
-    normals = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
-    normals = np.broadcast_to(normals, places.shape)
-    aside = ASIDE * width_of(places, normals, resolution)[..., None] * normals
-    counts = intensity_at(looked, free, places) > 0.5
-    share = counts.mean(axis=0)
-    on, left, right = (
-        np.sum(np.minimum(intensity_at(looked, over, places + shift), CLIP) * counts, axis=0)
-        / np.maximum(counts.sum(axis=0), 1)
-        for shift in (0, aside, -aside)
-    )
-    independent = np.minimum(cells - 2 * CUT, SAMPLES) * share
+    counts = free.ravel()[_pixels(looked, places)].sum(axis=0)
+    independent = np.minimum(cells - 2 * CUT, SAMPLES) * counts / SAMPLES
     mean = 1 - np.exp(-CLIP)
     variance = 1 - 2 * CLIP * np.exp(-CLIP) - np.exp(-2 * CLIP)
     deviation = np.sqrt(variance / np.maximum(independent, 1.0))
-    above = (on - mean) / deviation
-    beside = (on - np.maximum(left, right)) / (np.sqrt(2) * deviation)
-    return np.where(independent >= LEAST_CELLS, np.minimum(above, beside), 0.0)
+    on = mean_over(places)
+    significance = np.where(independent >= LEAST_CELLS, (on - mean) / deviation, 0.0)
+    # What is beside is read of the few that are bright.
+    bright = np.flatnonzero(significance >= least)
+    on, counts, deviation, places = on[bright], counts[bright], deviation[bright], places[:, bright]
+    along = (ends - starts)[bright]
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    normals = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
+    normals = np.broadcast_to(normals, places.shape)
+    aside = ASIDE * width_of(places, normals, resolution)[..., None] * normals
+    sides = np.maximum(mean_over(places + aside), mean_over(places - aside))
+    over_sides = (on - sides) / (np.sqrt(2) * deviation)
+    significance[bright] = np.minimum(significance[bright], over_sides)
+    return significance
+
+
+def _pixels(looked: Survey, points: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n"]:
+    """Return the index of the pixel that is nearest to each point."""
+    ranges = np.linalg.norm(looked.points[:, 0], axis=-1)
+    sines = looked.points[0, :, 0] / ranges[0]
+    reach = np.sqrt(points[..., 0] ** 2 + points[..., 1] ** 2)
+    rows = np.rint((reach - ranges[0]) / (ranges[1] - ranges[0])).astype(np.intp)
+    columns = np.rint((points[..., 0] / reach - sines[0]) / (sines[1] - sines[0])).astype(np.intp)
+    np.clip(rows, 0, len(ranges) - 1, out=rows)
+    np.clip(columns, 0, len(sines) - 1, out=columns)
+    return np.asarray(rows * len(sines) + columns)
 
 
 def _over_background(looked: Survey) -> Float[np.ndarray, "ranges sines"]:
