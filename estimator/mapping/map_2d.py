@@ -7,10 +7,13 @@ from jaxtyping import Float
 
 from estimator.array.array_frame import ArrayFrame
 from estimator.array.linear_array import echo_resolution
+from estimator.array.resolution_cell import coarse_resolution
 from estimator.geometry.wall_2d import Wall
+from estimator.imaging.backprojection import focus
 from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.peak_detection import image_contrast
 from estimator.imaging.survey_2d import Survey, survey
+from estimator.mapping.diffuse_multipath import without_scattered_twice
 from estimator.mapping.target_detection import find_targets
 from estimator.mapping.wall_unfolding import unfold_seen_lines
 from estimator.measurement.model import Echo
@@ -19,6 +22,10 @@ from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
 from estimator.walls.sources_aside import without_sources_aside
 from estimator.walls.wall_detection_2d import detect_mirrors, unassigned_peaks
+
+MOST_POINTS = 32
+"""Strongest peaks on no wall that are tried as what scatters on to a wall, for time: those that are
+weaker make no line that stands out. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +62,13 @@ def build_room_map(echo: Echo) -> RoomMap:
     prepared = PreparedEcho(echo)
     cleaned = without_sources_aside(prepared)
     looked = survey(cleaned.prepared.echo, prepared=cleaned.prepared, values=cleaned.image)
-    lines = detect_mirrors(echo, looked, prepared=prepared)
-    found = refine_by_echo(echo, looked, lines, prepared=prepared)
     resolution = echo_resolution(echo)
+    lines = detect_mirrors(echo, looked, prepared=prepared)
+    loose = unassigned_peaks(echo, looked, lines)[:MOST_POINTS]
+    points = np.concatenate([loose, cleaned.places])
+    levels = np.abs(focus(prepared.tapered, points)) ** 2
+    lines = without_scattered_twice(lines, points, levels, coarse_resolution(resolution))
+    found = refine_by_echo(echo, looked, lines, prepared=prepared)
     unfolded = unfold_seen_lines(found, resolution)
     aperture = float(np.ptp(echo.positions[:, 0]))
     return RoomMap(

@@ -75,6 +75,7 @@ class Cleaned:
     strongest: float
     """Intensity of the brightest source in the tapered image, 0 of none: an echo of bright
     sources is not noisy. [-]"""
+    places: Float[np.ndarray, "sources 3"]  # where they are [m]
     image: Complex[np.ndarray, "ranges sines"] | None
     """Tapered, on the survey's grid; ``None`` if it is not known. [-]"""
 
@@ -90,7 +91,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     echo = prepared.echo
     limit = imaged_sine(echo)
     if limit >= WIDEST_SINE:
-        return Cleaned(prepared=prepared, strongest=0.0, image=None)
+        return Cleaned(prepared=prepared, strongest=0.0, places=np.zeros((0, 3)), image=None)
     ranges, sines = survey_grid(echo, WIDEST_SINE)
     points = sector_points(ranges[:, None], sines)
     inner = len(survey_grid(echo, limit)[1])
@@ -99,6 +100,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     border = slice(max(outer - BORDER, 0), outer + inner + BORDER)
     near = NEAR_LOBE * float(np.ptp(echo.positions[:, 0]))
     rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
+    places: list[Float[np.ndarray, " 3"]] = []
     dominant = []
     strongest = 0.0
     image = None
@@ -115,6 +117,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
         if not tops.flat[brightest]:
             break
         place = points.reshape(-1, 3)[brightest]
+        places.append(place)
         strongest = max(strongest, float(intensity.flat[brightest]))
         left = echo.samples - _source_echo(echo, place)
         if np.linalg.norm(left) ** 2 < (1 - MOST_OF_IT) * np.linalg.norm(echo.samples) ** 2:
@@ -127,7 +130,10 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     if dominant:
         prepared = PreparedEcho(echo)
     return Cleaned(
-        prepared=prepared, strongest=strongest, image=None if image is None else image[:, within]
+        prepared=prepared,
+        strongest=strongest,
+        places=np.array(places).reshape(-1, 3),
+        image=None if image is None else image[:, within],
     )
 
 
