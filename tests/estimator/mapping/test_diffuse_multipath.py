@@ -1,11 +1,13 @@
 """Where diffuse echoes over a rough mirror appear, against their own lengths."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimator.array.resolution_cell import Resolution
 from estimator.geometry.wall_2d import mirrored
-from estimator.mapping.diffuse_multipath import between, in_cloud
+from estimator.mapping.diffuse_multipath import between, in_cloud, without_scattered_twice
 from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
@@ -62,3 +64,23 @@ def test_one_way_out_and_another_back_appear_between_the_two() -> None:
     mixed = reach * np.array([sine, np.sqrt(1 - sine**2), 0.0])
     points = np.stack([mixed, direct, GHOST, mixed * 1.02])
     assert between(points, direct, GHOST, RESOLUTION).tolist() == [True, False, False, False]
+
+
+def test_a_line_that_a_wall_makes_by_way_of_a_post_is_no_wall() -> None:
+    post = np.array([-0.2, 0.55, 0.0])
+
+    def by_way(share: float) -> np.ndarray:
+        # Out to the post, on to a facet and straight back: half the way, and the mean sine.
+        facet = on_wall(share)
+        ways = [np.linalg.norm(post), np.linalg.norm(facet)]
+        sine = 0.5 * (post[0] / ways[0] + facet[0] / ways[1])
+        half = 0.5 * (sum(ways) + np.linalg.norm(facet - post))
+        return np.asarray(half * np.array([sine, np.sqrt(1 - sine**2), 0.0]))
+
+    twice = replace(WALL, start=by_way(0.1), end=by_way(0.4))
+    posts, bright = post[None], np.array([100.0])
+    assert without_scattered_twice([WALL, twice], posts, bright, RESOLUTION) == (WALL,)
+    # Without anything as bright there, or a few cells beside, it is a wall.
+    assert len(without_scattered_twice([WALL, twice], posts, 0.01 * bright, RESOLUTION)) == 2
+    moved = replace(twice, start=1.03 * twice.start, end=1.03 * twice.end)
+    assert without_scattered_twice([WALL, moved], posts, bright, RESOLUTION) == (WALL, moved)
