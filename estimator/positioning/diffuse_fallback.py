@@ -102,8 +102,7 @@ def with_diffuse_search(
             alternatives=tuple(_moved(diffuse, rival) for rival in fix.rivals),
         )
     if len(agreeing) == 1:
-        better = agreeing[0] if _spread(agreeing[0]) < _spread(diffuse) else diffuse
-        return _among_alike(replace(better, paths=answer.paths), agreeing[0], answer)
+        return _among_alike(diffuse, agreeing[0], answer)
     return _weighed(diffuse, fix, seen, answer)
 
 
@@ -135,40 +134,72 @@ def _against_paths(answer: UserEstimate, diffuse: UserEstimate) -> UserEstimate:
     )
 
 
-def _among_alike(better: UserEstimate, agreed: UserEstimate, answer: UserEstimate) -> UserEstimate:
-    """Leave what the diffuse field shows no difference to: more mirrors, or behind the wall.
+def _among_alike(diffuse: UserEstimate, agreed: UserEstimate, answer: UserEstimate) -> UserEstimate:
+    """Weigh the place that the diffuse field agrees with against the other ones.
 
-    A wall scatters what arrives at it. That shows the user's image in the mirrors beyond the wall,
-    and a place behind the wall as its own image.
+    A wall scatters what arrives at it: that shows the user's image in the mirrors beyond the wall,
+    and a place behind the wall as its own image. To such places the diffuse field makes no
+    difference. Others are given up; but where paths hold most of the energy (:data:`MOST_ENERGY`),
+    their odds only fall by how much rarer two places agree by chance.
+
+    Parameters
+    ----------
+    diffuse
+        Where it says that the user is.
+    agreed
+        The one place over mirror-like paths that agrees.
+    answer
+        From the paths, with all its places.
     """
-    alike = [one for one in (answer, *answer.alternatives) if _scatters_alike(one, agreed)]
-    chances = [one.probability or 0.0 for one in alike]
+    better = agreed if _spread(agreed) < _spread(diffuse) else diffuse
+    left = 0.0
+    if _share(answer) > MOST_ENERGY:
+        left = (1 - ALONE) / ALONE * _chance_to_agree(agreed, diffuse)
+    others = [one for one in (answer, *answer.alternatives) if one is not agreed]
+    weights = [
+        (one.probability or 0.0) * (1.0 if _scatters_alike(one, agreed) else left) for one in others
+    ]
     believed = agreed.probability or UNSTATED
-    left = sum(chances) / (sum(chances) + believed)
-    if (1 - left) * TOGETHER >= CERTAIN:
+    total = believed + sum(weights)
+    probability = believed / total * TOGETHER
+    if probability >= CERTAIN:
         return replace(
             better,
+            paths=answer.paths,
             status="found",
             reason=None,
             alternatives=(),
-            probability=(1 - left) * TOGETHER,
+            probability=probability,
         )
+    named = [
+        replace(one, status="ambiguous", reason=None, alternatives=(), probability=chance)
+        for one, chance in (
+            (better, probability),
+            *((one, TOGETHER * w / total) for one, w in zip(others, weights, strict=True) if w > 0),
+        )
+    ]
+    likeliest, *rest = sorted(named, key=lambda one: -(one.probability or 0.0))
     return replace(
-        better,
-        status="ambiguous",
+        likeliest,
+        paths=answer.paths,
         reason="the wall scatters as it would with one more mirror beyond it, or with the user "
-        "behind it",
-        probability=(1 - left) * TOGETHER,
-        alternatives=tuple(
-            replace(
-                one,
-                status="ambiguous",
-                alternatives=(),
-                probability=TOGETHER * chance / (sum(chances) + believed),
-            )
-            for one, chance in zip(alike, chances, strict=True)
-        ),
+        "behind it; or a path ends elsewhere",
+        alternatives=tuple(rest),
     )
+
+
+def _chance_to_agree(one: UserEstimate, other: UserEstimate) -> float:
+    """Return how probable it is that an unrelated place agrees with another. [-].
+
+    Both are on the same path length from the wall: what is left to chance is the direction, a
+    quarter of a circle.
+    """
+    assert one.covariance is not None
+    assert other.covariance is not None
+    assert one.position is not None
+    spread = (one.covariance + other.covariance)[:2, :2]
+    width = 2 * float(np.sqrt(SAME * np.linalg.eigvalsh(spread)[-1]))
+    return min(1.0, width / (0.5 * np.pi * float(np.linalg.norm(one.position))))
 
 
 def _scatters_alike(one: UserEstimate, agreed: UserEstimate) -> bool:

@@ -1,4 +1,4 @@
-r"""Two tests on the echo whether a line of the image is a wall.
+r"""Three tests on the echo whether a line of the image is a wall.
 
 *Explained share*. The row's strengths are fitted to all range profiles by least squares, as in
 :mod:`estimator.walls.line_fit_echo`. Echo and residual are then focused on cells along the line and
@@ -8,6 +8,8 @@ same ranges but other directions does not count.
 
 *More than one range*. The sidelobes of a point that only a part of the array sees lie on an arc of
 its range. A short line along an arc is told from it only by the reflection of the array.
+
+*Curvature*. Waves that were scattered twice are more curved than those of a wall there.
 """
 
 from dataclasses import dataclass
@@ -18,6 +20,8 @@ from scipy.linalg import cho_solve
 
 from estimator.array.resolution_cell import Resolution
 from estimator.array.windows import SURVEY_TAPER, aperture_taper
+from estimator.imaging.phase_curvature import bent_intensities
+from estimator.imaging.range_compression import RangeProfiles
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_sampling import trial_points
@@ -38,6 +42,9 @@ ASIDE = np.arange(-4.0, 5.0)
 """Places across the line at which echo and residual are compared. [cells]"""
 BEYOND = 4.0
 """How far the row goes on beyond the line's ends, which are found to a few cells. [cells]"""
+
+FEWEST_BENT, MOST_BENT_PLACES = 8, 64
+"""Places of a line, one for each cell, of which the curvature is taken together. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +74,34 @@ def depth_of(line: FittedLine, resolution: Resolution) -> float:
     """Return a line's extent in range. [cells]."""
     ranges = np.linalg.norm([line.start, line.end, _nearest_place(line)], axis=-1)
     return float(np.ptp(ranges)) / resolution.along_ray
+
+
+def gain_by_bending(profiles: RangeProfiles, line: FittedLine, resolution: Resolution) -> float:
+    """Return the intensity that one excess curvature adds to all places of a line. [-].
+
+    What was scattered twice, by a post and a rough wall or by two walls, lies on lines as well; but
+    its waves are more curved than those of things there, and all alike. A single peak of speckle
+    may be so by chance.
+
+    Parameters
+    ----------
+    profiles
+        Of the echo, not tapered.
+    line
+        As fitted to the image.
+    resolution
+        Of the echo.
+
+    Returns
+    -------
+    Sum of the intensities with the best curvature over that with a point's: 1 at least.
+    """
+    cells = line.length / float(resolution.cell(line.middle, line.direction))
+    count = int(np.clip(cells, FEWEST_BENT, MOST_BENT_PLACES))
+    places = (np.arange(count) + 0.5) / count
+    points = line.start + places[:, None] * (line.end - line.start)
+    tried = bent_intensities(profiles, points, resolution).sum(axis=0)
+    return float(tried.max() / tried[0])
 
 
 def _nearest_place(line: FittedLine) -> Float[np.ndarray, " 3"]:

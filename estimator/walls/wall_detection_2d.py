@@ -11,12 +11,13 @@ from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing
 from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
+from estimator.imaging.range_compression import RangeProfiles
 from estimator.imaging.survey_2d import REFLECTED, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_detection import LineCandidate, find_lines
-from estimator.walls.line_evidence import depth_of, examine
+from estimator.walls.line_evidence import depth_of, examine, gain_by_bending
 from estimator.walls.line_extent import face_ends
 from estimator.walls.line_fit_image import fit_between, fit_line
 from estimator.walls.line_relations import (
@@ -39,6 +40,13 @@ MOST_BENT = 0.4
 angles, in simulated and full-wave echoes, it is a quarter at most: on those that nearly face the
 array, where many facets share a range. On lines through diffuse multipath and grating lobes it is
 from a half to all. [-]"""
+MOST_BY_BENDING = 1.04
+"""Most intensity that an excess curvature may add to an oblique wall, over all its places: less
+than 0.5 % to 15 walls of random rooms, 8 to 22 % to four lines that posts and rough walls made. [-]
+"""
+OBLIQUE = 0.5
+"""Least extent in range of such walls, over their length: on those that nearly face the array many
+facets share a range, and a curvature adds up to 21 % by chance. [-]"""
 WALL_COHERENCE = 0.2
 """Least median coherence factor of the peaks on a wall that does not reflect the array in itself.
 Of the same walls it was 0.3 to 0.98; of ambiguities of range and angle, 0.04 and 0.1. [-]"""
@@ -114,8 +122,9 @@ def detect_mirrors(
     farthest = echo_reach(echo)[1]
     ready = PreparedEcho(echo) if prepared is None else prepared
     plain, tapered = (focus_within(one, farthest) for one in (ready.plain, ready.tapered))
+    profiles = ready.plain.profiles
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
-    certain, doubtful = _fitted(echo, looked, candidates, plain, tapered)
+    certain, doubtful = _fitted(echo, looked, candidates, plain, tapered, profiles)
     lines = [line for line in _best_of(certain, coarse) if not is_edge_on(line, half)]
     lines = _cut_where_they_cross(lines, echo_resolution(echo), plain, tapered)
     in_sight = [line for line in lines if not is_hidden(line, lines)]
@@ -129,7 +138,7 @@ def detect_mirrors(
         dtype=bool,
     )
     ghosts = find_lines(looked.peaks[one_wave & ~looked.bent & behind], coarse)
-    certain, more = _fitted(echo, looked, ghosts, plain, tapered)
+    certain, more = _fitted(echo, looked, ghosts, plain, tapered, profiles)
     # What the peaks leave in doubt, an image of it over a wall proves.
     proved = seen_twice(_best_of([*doubtful, *more], coarse), in_sight, echo_resolution(echo))
     in_sight += [
@@ -154,6 +163,7 @@ def _fitted(
     candidates: Sequence[LineCandidate],
     plain: Focus,
     tapered: Focus,
+    profiles: RangeProfiles,
 ) -> tuple[list[FittedLine], list[FittedLine]]:
     """Fit candidates that are no part of a line that was fitted.
 
@@ -177,7 +187,7 @@ def _fitted(
             continue
         if line.level < LEAST_CONTRAST * line.background:
             continue
-        if line.length < LEAST_CELLS * float(resolution.cell(line.middle, line.direction)):
+        if _cells(line, resolution) < LEAST_CELLS:
             continue
         if _is_uncertain(line, resolution):
             continue
@@ -187,6 +197,9 @@ def _fitted(
         shallow = evidence.depth < LEAST_DEPTH
         if shallow and not _reflects(line, looked, coarse):
             continue  # along an arc of sidelobes
+        oblique = evidence.depth > OBLIQUE * _cells(line, resolution)
+        if oblique and gain_by_bending(profiles, line, resolution) > MOST_BY_BENDING:
+            continue  # scattered twice
         plain_waves = _is_of_waves(line, looked, coarse)
         least = EXPLAINED if plain_waves and not shallow else WELL_EXPLAINED
         certain = evidence.explained >= least and (plain_waves or not is_edge_on(line, half))
@@ -272,6 +285,11 @@ def _fitted_line(
     )
     followed, between = (examine(echo, one, resolution) for one in (same_part, own))
     return own if between.explained > followed.explained else line
+
+
+def _cells(line: FittedLine, resolution: Resolution) -> float:
+    """Return the length of a line. [cells]."""
+    return line.length / float(resolution.cell(line.middle, line.direction))
 
 
 def _peaks_on(line: FittedLine, looked: Survey, coarse: Resolution) -> Bool[np.ndarray, " peaks"]:
