@@ -209,3 +209,32 @@ def test_of_ambiguous_places_the_one_that_the_diffuse_field_confirms_is_taken() 
     assert answer.status == "found"
     assert answer.method == "paths"
     np.testing.assert_array_equal(answer.position, USER)
+
+
+def test_a_wide_place_that_agrees_by_chance_overrules_no_path_with_most_of_the_energy() -> None:
+    pilot = scattered_pilot(on(WALL), USER, 4)
+    wide = UserEstimate(
+        name="user",
+        status="ambiguous",
+        position=USER + np.array([0.05, 0.0, 0.0]),
+        covariance=np.diag([0.1, 0.1, 0.0]) ** 2,
+        probability=0.15,
+    )
+    direct = UserEstimate(
+        name="user",
+        status="ambiguous",
+        position=np.array([0.2, 0.1, 0.0]),
+        covariance=np.diag([1e-4, 1e-4, 0.0]) ** 2,
+        probability=0.85,
+        alternatives=(wide,),
+        paths=(path(0.93),),
+    )
+    answer = with_diffuse_search(direct, pilot, [line(WALL)], [WALL], [()])
+    assert answer.status == "ambiguous"
+    assert answer.position is not None
+    np.testing.assert_array_equal(answer.position, direct.position)
+    (other,) = answer.alternatives
+    assert other.method == "diffuse"
+    # Paths with little of it are given up, as before.
+    weak = replace(direct, paths=(path(0.2),))
+    assert with_diffuse_search(weak, pilot, [line(WALL)], [WALL], [()]).status == "found"
