@@ -77,7 +77,7 @@ def depth_of(line: FittedLine, resolution: Resolution) -> float:
 
 
 def gain_by_bending(profiles: RangeProfiles, line: FittedLine, resolution: Resolution) -> float:
-    """Return the intensity that one excess curvature adds to all places of a line. [-].
+    """Return the intensity that one excess curvature adds to most places of a line. [-].
 
     What was scattered twice, by a post and a rough wall or by two walls, lies on lines as well; but
     its waves are more curved than those of things there, and all alike. A single peak of speckle
@@ -94,14 +94,15 @@ def gain_by_bending(profiles: RangeProfiles, line: FittedLine, resolution: Resol
 
     Returns
     -------
-    Sum of the intensities with the best curvature over that with a point's: 1 at least.
+    Median, over the places, of the intensity with the best curvature over that with a point's: 1 at
+    least. Sidelobes of something bright beside a wall are bent at some of its places.
     """
     cells = line.length / float(resolution.cell(line.middle, line.direction))
     count = int(np.clip(cells, FEWEST_BENT, MOST_BENT_PLACES))
     places = (np.arange(count) + 0.5) / count
     points = line.start + places[:, None] * (line.end - line.start)
-    tried = bent_intensities(profiles, points, resolution).sum(axis=0)
-    return float(tried.max() / tried[0])
+    tried = bent_intensities(profiles, points, resolution)
+    return float(np.median(tried / tried[:, :1], axis=0).max())
 
 
 def _nearest_place(line: FittedLine) -> Float[np.ndarray, " 3"]:

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from jaxtyping import Float
+from scipy.constants import speed_of_light
 
 from estimator.array.linear_array import echo_resolution
 from estimator.geometry.wall_2d import mirrored
+from estimator.imaging.range_compression import range_profiles
 from estimator.walls.fitted_line import FittedLine
-from estimator.walls.line_evidence import examine
+from estimator.walls.line_evidence import examine, gain_by_bending
 
 MIDDLE = (0.02, 0.3)
 
@@ -67,3 +69,30 @@ def test_the_depth_of_a_line_is_its_extent_in_range(world: Any) -> None:
     )
     radial = replace(line, start=np.array([0.0, 0.25, 0.0]), end=np.array([0.0, 0.35, 0.0]))
     assert examine(echo, radial, resolution).depth == pytest.approx(0.1 / resolution.along_ray)
+
+
+def test_waves_by_way_of_a_post_are_bent_and_a_walls_are_not(world: Any) -> None:
+    rng = np.random.default_rng(2)
+    facets = world.rough_line((0.06, 0.3), 60.0, 0.1, rng, count=200)
+    echo = world.echo(facets, rng, snr_db=40.0)
+    resolution = echo_resolution(echo)
+    line = line_at((0.06, 0.3), 60.0, 0.1)
+    profiles = range_profiles(echo)
+    assert gain_by_bending(profiles, line, resolution) < 1.02
+    # Out to a post, on to a facet, and straight back: a line at half the way and the mean sine.
+    post = np.array([-0.07, 0.22, 0.0])
+    legs = [
+        np.linalg.norm(echo.positions[:, None] - places, axis=-1) for places in (post[None], facets)
+    ]
+    ways = legs[0] + legs[1] + np.linalg.norm(facets - post, axis=-1)
+    strengths = rng.standard_normal(len(facets)) + 1j * rng.standard_normal(len(facets))
+    turns = np.exp(-2j * np.pi / speed_of_light * ways[..., None] * echo.frequencies)
+    twice = replace(echo, samples=np.einsum("mfn,f->mn", turns, strengths))
+    reach = [np.linalg.norm(one) for one in (post, line.start, line.end)]
+    ends = []
+    for tip, far in zip((line.start, line.end), reach[1:], strict=True):
+        half = 0.5 * (reach[0] + far + float(np.linalg.norm(tip - post)))
+        sine = 0.5 * (post[0] / reach[0] + tip[0] / far)
+        ends.append(half * np.array([sine, np.sqrt(1 - sine**2), 0.0]))
+    seen = replace(line, start=ends[0], end=ends[1])
+    assert gain_by_bending(range_profiles(twice), seen, resolution) > 1.1
