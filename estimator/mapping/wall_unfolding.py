@@ -153,9 +153,7 @@ def _stands_before(line: FittedLine, other: FittedLine) -> bool:
 
 def _chain_before(line: FittedLine, walls: Sequence[Wall]) -> Chain:
     """Return the mirrors over which most of a line is seen."""
-    shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    points = line.start + shares[:, None] * (line.end - line.start)
-    met = unfolded(points, walls)[1]
+    met = unfolded(_places(line), walls)[1]
     chains = Counter(tuple(int(i) for i in row if i >= 0) for row in met)
     return chains.most_common(1)[0][0]
 

@@ -26,7 +26,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.imaging.peak_detection import DYNAMIC_RANGE, peaks_above
 from estimator.imaging.survey_2d import Survey
 from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
-from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, width_of
+from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, best_segments, width_of
 
 END = 1e-3
 """False-alarm rate of an end: an image has some dozens of such maxima of noise, and what counts is
@@ -42,8 +42,6 @@ CUT = 3.0
 cells (:data:`estimator.walls.ridge_detection.ASIDE`). [cells]"""
 LEAST_CELLS = 8.0
 """Shortest part between: with fewer, only lines that single places show pass. [cells]"""
-MOST_LINES = 8
-"""Lines at which the search ends, as for ridges. [-]"""
 
 
 def find_faint_lines(
@@ -85,17 +83,7 @@ def find_faint_lines(
         looked, over, free, peaks[first], peaks[second], cells, least, resolution
     )
     score = np.where(significance >= least, significance, 0.0)
-    found: list[LineCandidate] = []
-    while score.max() > 0 and len(found) < MOST_LINES:
-        best = int(np.argmax(score))
-        line = LineCandidate(
-            start=peaks[first[best]], end=peaks[second[best]], inliers=round(cells[best])
-        )
-        found.append(line)
-        gone = on_segment(peaks, line, resolution, tolerance=SKIRT)
-        gone[[first[best], second[best]]] = True
-        score[gone[first] | gone[second]] = 0.0
-    return tuple(found)
+    return best_segments(peaks, (first, second), score, cells, resolution)
 
 
 def _significance(

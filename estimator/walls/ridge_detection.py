@@ -8,7 +8,7 @@ background and than the image a few cells to either side.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import map_coordinates
 
 from estimator.array.resolution_cell import Resolution
@@ -70,16 +70,42 @@ def find_ridges(
     first, second, cells = first[long], second[long], cells[long]
     share = _lit_share(looked, peaks[first], peaks[second], resolution)
     score = np.where(share >= LIT_SHARE, share * cells, 0.0)
+    return best_segments(peaks, (first, second), score, score, resolution)
+
+
+def best_segments(
+    peaks: Float[np.ndarray, "peaks 3"],
+    pairs: tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]],
+    score: Float[np.ndarray, " pairs"],
+    cells: Float[np.ndarray, " pairs"],
+    resolution: Resolution,
+) -> tuple[LineCandidate, ...]:
+    """Pick the segments of the highest scores, none with an end on another.
+
+    Parameters
+    ----------
+    peaks
+        The ends. [m]
+    pairs
+        First and second end of each segment.
+    score
+        What is picked by; 0: never.
+    cells
+        What a segment has as its inliers.
+    resolution
+        Of the image.
+    """
+    (first, second), left = pairs, score.copy()
     found: list[LineCandidate] = []
-    while score.size and score.max() > 0 and len(found) < MOST_RIDGES:
-        best = int(np.argmax(score))
-        ridge = LineCandidate(
-            start=peaks[first[best]], end=peaks[second[best]], inliers=round(score[best])
+    while left.size and left.max() > 0 and len(found) < MOST_RIDGES:
+        best = int(np.argmax(left))
+        line = LineCandidate(
+            start=peaks[first[best]], end=peaks[second[best]], inliers=round(cells[best])
         )
-        found.append(ridge)
-        gone = on_segment(peaks, ridge, resolution, tolerance=SKIRT)
+        found.append(line)
+        gone = on_segment(peaks, line, resolution, tolerance=SKIRT)
         gone[[first[best], second[best]]] = True
-        score[gone[first] | gone[second]] = 0.0
+        left[gone[first] | gone[second]] = 0.0
     return tuple(found)
 
 
