@@ -39,6 +39,10 @@ BEYOND_FLAT = 1.1
 """The same over that of a wave without curvature: 1.35 to 1.4 there, and less than 1 on the
 reflection of the array in walls that face it. [-]"""
 
+ARC = 2.0
+"""Intensity of the brightest as from beyond, over the brightest as from where it is imaged, from
+which an arc is one wave's from beyond: such a wave loses its number of cells across, tens. [-]"""
+
 MOST = 3.0
 """Most that one peak counts in a mean of such ratios. [-]"""
 CLEARLY_HERE = 0.5
@@ -136,6 +140,41 @@ def focus_by_range(
             np.maximum(trial, focused.max(axis=1), out=trial)
     best /= profiles.gain**2
     return FocusByRange(here=best[0], beyond=best[1:-1].max(axis=0), flat=best[-1])
+
+
+def brightest_from_beyond(
+    profiles: RangeProfiles,
+    ranges: Float[np.ndarray, " ranges"],
+    sines: Float[np.ndarray, " sines"],
+) -> float:
+    """Return how much brighter some ranges are focused from beyond the unambiguous range. [-].
+
+    Near the array, the echo of one post from beyond is imaged as an arc over many directions, of
+    which peak by peak none is focused there: only its own direction is, and that decides here.
+
+    Parameters
+    ----------
+    profiles
+        Of an echo in the array's frame, not tapered.
+    ranges
+        Where things are imaged, less than a cell apart. [m]
+    sines
+        Directions in which things may be, less than a cell apart. [-]
+
+    Returns
+    -------
+    Largest intensity as from beyond, over the largest as from here.
+    """
+    longer = profiles.unambiguous / (profiles.passes * len(profiles.legs))
+    brightest = np.zeros(ORDERS + 1)
+    for reach in ranges:
+        for order in range(ORDERS + 1):
+            x = (reach + order * longer) * sines
+            y = (reach + order * longer) * np.sqrt(1 - sines**2)
+            points = np.stack([x, y, np.zeros_like(x)], axis=-1)
+            focused = np.abs(aligned_profiles(profiles, points, 0.0).sum(axis=-1)) ** 2
+            brightest[order] = max(brightest[order], float(focused.max()))
+    return float(brightest[1:].max() / brightest[0]) if brightest[0] > 0 else 0.0
 
 
 def _lengths(

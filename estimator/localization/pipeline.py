@@ -15,6 +15,7 @@ from estimator.array.viewpoint import viewpoint
 from estimator.channel.path import PathSet
 from estimator.compute.blas_threads import one_blas_thread
 from estimator.consistency.doubt import Doubted, doubted
+from estimator.consistency.faulty_samples import without_faults
 from estimator.consistency.pilot_curvature import pilot_lateness
 from estimator.consistency.same_samples import refuse_same_samples
 from estimator.consistency.stated_heights import height_error
@@ -127,6 +128,12 @@ def locate(
     if echo is not None:
         for uplink in uplinks:
             refuse_same_samples(echo, uplink)
+        screened = without_faults(echo, "echo")
+        echo = screened.data
+        notes += screened.notes
+    heard_by = [without_faults(one, f"pilot of {one.user!r}") for one in uplinks]
+    notes += [note for one in heard_by for note in one.notes]
+    uplinks = tuple(one.data for one in heard_by)
     frame = stages.frame(measurement)
     steps = 2 + len(uplinks) + bool(measurement.path_lists)
 

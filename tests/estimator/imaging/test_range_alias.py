@@ -7,7 +7,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.array.linear_array import echo_resolution
-from estimator.imaging.range_alias import focus_by_range
+from estimator.imaging.range_alias import ARC, brightest_from_beyond, focus_by_range
 from estimator.imaging.range_compression import range_profiles
 from estimator.imaging.survey_2d import survey
 from estimator.localization.aliasing import range_notes
@@ -68,3 +68,19 @@ def test_a_wall_beyond_the_unambiguous_range_is_no_mirror_nearby(world: Any) -> 
     assert np.mean(looked.beyond) > 0.8
     (note,) = range_notes(far, looked.beyond)
     assert "0.5 m" in note
+
+
+@pytest.mark.parametrize("farther", [False, True])
+def test_an_arc_beside_the_array_is_told_from_a_post_there(farther: bool, world: Any) -> None:
+    # Half an aperture away, a wave from beyond is spread over half of all directions.
+    rng = np.random.default_rng(3)
+    place = np.array([-0.008, 0.030, 0.0])
+    echo = world.echo(place[None], rng)
+    if farther:
+        echo = world.echo(beyond(place, echo)[None], rng)
+    cell = echo_resolution(echo).along_ray
+    ranges = np.arange(0.026, 0.036, 0.75 * cell)
+    ratio = brightest_from_beyond(range_profiles(echo), ranges, np.linspace(-0.6, 0.6, 201))
+    # k h² (1/r − 1/(r + 0.5 m)) is 90 rad at the ends of 24 mm: spread over some 30 cells across.
+    assert (ratio > ARC) == farther
+    assert ratio > 5 if farther else ratio < 0.5
