@@ -12,7 +12,12 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from scenes.meshes.mesh_file import mesh_contains
-from scenes.meshes.mitsuba_xml import ForeignMaterial, ForeignShape, read_mitsuba_xml
+from scenes.meshes.mitsuba_xml import (
+    RADIO_DEFAULTS,
+    ForeignMaterial,
+    ForeignShape,
+    read_mitsuba_xml,
+)
 from scenes.schema.errors import ScenarioError, did_you_mean, problems
 from scenes.schema.materials import MATERIALS, SLABS, usual_texture
 from scenes.schema.objects import MeshFile
@@ -37,6 +42,11 @@ class Geometry(Checked):
     )
     facets: Literal["cut", "file"] = Field(
         "cut", description="'cut' its triangles until they are fine enough, or 'file': as they are"
+    )
+    beyond_itu: bool = Field(
+        False,
+        description="whether bands that ITU-R P.2040-4 does not cover for one of the file's materials "
+        "are taken from its nearest rows",
     )
     materials: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
@@ -180,7 +190,7 @@ def _clashes(shapes: tuple[ForeignShape, ...], own: Mapping[str, object]) -> lis
 
 def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
     body: dict[str, object] = {
-        **_made_of(shape.material),
+        **_made_of(shape.material, beyond=geometry.beyond_itu),
         **geometry.materials.get(shape.material.name, {}),
         **geometry.objects.get(shape.name, {}),
         "kind": "mesh",
@@ -223,7 +233,7 @@ def _open_rooms(objects: dict[str, object], places: Float[np.ndarray, "antennas 
             body["hollow"] = True
 
 
-def _made_of(material: ForeignMaterial) -> dict[str, object]:
+def _made_of(material: ForeignMaterial, *, beyond: bool) -> dict[str, object]:
     """Return what the file says of a material, as keys of an object."""
     if material.slab is not None:
         return {
@@ -238,6 +248,10 @@ def _made_of(material: ForeignMaterial) -> dict[str, object]:
         return {"material": "metal"}
     if name not in SLABS:
         return {}
-    if material.thickness is None:
+    if material.thickness is None and not beyond:
         return {"material": name}
-    return {"material": {"name": name, "thickness_mm": material.thickness * 1e3}}
+    thickness = material.thickness
+    if thickness is None:
+        thickness = RADIO_DEFAULTS["thickness"]
+    told = {"beyond_itu": True} if beyond else {}
+    return {"material": {"name": name, "thickness_mm": thickness * 1e3, **told}}

@@ -5,6 +5,7 @@ cannot load plugins; it may name PLY and OBJ files in its own folder, and no oth
 lights and integrators are ignored.
 """
 
+import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +24,7 @@ from scenes.meshes.mitsuba_elements import (
 )
 from scenes.meshes.mitsuba_transforms import transform
 from scenes.schema.errors import did_you_mean, shown_text
-from scenes.schema.quantities import FORBIDDEN_IN_NAMES
+from scenes.schema.quantities import FORBIDDEN_IN_NAMES, LONGEST_NAME
 
 MOST_SHAPES = 10_000
 """Most shapes of a foreign scene, each instance for itself: each becomes an object."""
@@ -219,6 +220,8 @@ def _material(path: Path, element: ElementTree.Element) -> ForeignMaterial:
                 itu_type = attribute(path, parameter, "value")
             if parameter.tag == "float" and parameter.get("name") == "thickness":
                 thickness = numbers(path, parameter, "value", 1)[0]
+        if kind == "itu-radio-material" and thickness is None:
+            thickness = RADIO_DEFAULTS["thickness"]
     return ForeignMaterial(name=name, itu_type=itu_type, thickness=thickness)
 
 
@@ -299,8 +302,18 @@ def _to_world(path: Path, element: ElementTree.Element) -> Float[np.ndarray, "4 
 
 
 def _key(name: str) -> str:
-    """Replace what a name in a scenario must not hold: Blender's 'Cube.001' is Cube_001."""
-    return "".join("_" if sign in FORBIDDEN_IN_NAMES else sign for sign in name)
+    """Replace what a name in a scenario must not hold: Blender's 'Cube.001' is Cube_001.
+
+    The end of one that is too long gives way to eight hexadecimal digits of the whole, so that names
+    that differ at their ends stay apart.
+    """
+    plain = "".join(
+        "_" if sign in FORBIDDEN_IN_NAMES or not sign.isprintable() else sign for sign in name
+    ).strip()
+    if len(plain) <= LONGEST_NAME:
+        return plain
+    digest = hashlib.sha256(name.encode()).hexdigest()[:8]
+    return f"{plain[: LONGEST_NAME - 9]}_{digest}"
 
 
 def _mesh_file(path: Path, name: str, folders: tuple[Path, ...]) -> Path:

@@ -97,6 +97,11 @@ class Slab(Checked):
         min_length=1,
         description="a CSV table frequency_ghz,eps_real,eps_imag, relative to the scenario's file",
     )
+    beyond_itu: bool = Field(
+        False,
+        description="with a name: whether bands between and beyond the rows of ITU-R P.2040-4 are "
+        "taken from the nearest rows",
+    )
     thickness_mm: float = Field(
         gt=0, allow_inf_nan=True, description="the thickness, inf for an opaque body [mm]"
     )
@@ -118,6 +123,10 @@ class Slab(Checked):
                 "conductivity_s_m = {conductivity} stands for the loss of a permittivity; give "
                 "permittivity = [e', 0] with it, or leave it out",
                 {"conductivity": self.conductivity_s_m},
+            )
+        if self.beyond_itu and self.name is None:
+            raise PydanticCustomError(
+                "slab", "beyond_itu = true is about named materials; give a name, or leave it out"
             )
         if math.isnan(self.thickness_mm):
             raise PydanticCustomError("slab", "thickness_mm = nan; give a number, or inf")

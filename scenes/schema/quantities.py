@@ -13,6 +13,9 @@ THINNEST = 1e-5
 """Smallest size of an object: a tenth of the wavelength at 3 THz [m]."""
 
 FORBIDDEN_IN_NAMES = "./\\=\"'[]"
+
+LONGEST_NAME = 64
+"""Most characters of a name. [-]"""
 """Signs that a name must not hold: it is part of dotted keys and of file names."""
 
 
@@ -38,12 +41,12 @@ def _name(value: str) -> str:
     if not value:
         raise PydanticCustomError("name", "must not be empty; give it a name, such as 'wall'")
     bad = [sign for sign in value if sign in FORBIDDEN_IN_NAMES or not sign.isprintable()]
-    if bad or value != value.strip() or len(value) > 64:
+    if bad or value != value.strip() or len(value) > LONGEST_NAME:
         raise PydanticCustomError(
             "name",
-            "must have at most 64 printable characters, none of {signs} and no space at its "
+            "must have at most {longest} printable characters, none of {signs} and no space at its "
             "ends (it is part of keys and file names); rename it",
-            {"signs": " ".join(FORBIDDEN_IN_NAMES)},
+            {"signs": " ".join(FORBIDDEN_IN_NAMES), "longest": LONGEST_NAME},
         )
     return value
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.schema.objects import Body, Box, MeshFile, Plate
+from scenes.surfaces.facet_spacing import facet_spacing, mesh_facet_count
 from scenes.surfaces.mesh_refinement import flat_patches
 
 LEAST_FACE = 10.0
@@ -19,6 +20,10 @@ MOST_FACES = 1000
 """Flat faces of one mesh above which it stands for something round, whatever their size: each would
 be a mirror of its own, and every pair of them a chain. A room of 3000 triangles has some tens.
 Chosen. [-]"""
+
+MOST_ROUND = 2**24
+"""Facets of something round beyond which its flat faces are mirrors after all, as in Sionna RT's path
+solver: terrain and roofs of a town, of which facets would take hours. Chosen. [-]"""
 
 
 def flat_and_smooth(body: Body, wavelength: float) -> bool:
@@ -41,6 +46,9 @@ def flat_and_smooth(body: Body, wavelength: float) -> bool:
             mesh = placed_mesh(body)
             faces = int(flat_patches(mesh).max()) + 1
             wide = np.sqrt(mesh.area / faces) >= LEAST_FACE * wavelength
-            return bool(wide and faces <= MOST_FACES)
+            if not wide or faces <= MOST_FACES:
+                return bool(wide)
+            spacing = facet_spacing(body, wavelength)
+            return mesh_facet_count(mesh.area, len(mesh.faces), spacing) > MOST_ROUND
         case _:
             return False

@@ -175,7 +175,11 @@ CARDBOARD = 2.0 - 0.1j
 
 
 def named_material(
-    name: str, frequencies: Float[np.ndarray, " freqs"], *, thickness: float | None = None
+    name: str,
+    frequencies: Float[np.ndarray, " freqs"],
+    *,
+    thickness: float | None = None,
+    beyond: bool = False,
 ) -> Material:
     """Return a material by its name.
 
@@ -191,6 +195,8 @@ def named_material(
         The band that the material has to be known for. [Hz]
     thickness
         Thickness of a slab, if not that of :data:`THICKNESS`. [m]
+    beyond
+        Whether bands that no row of ITU-R P.2040-4 covers are taken from the nearest rows.
 
     Raises
     ------
@@ -211,7 +217,7 @@ def named_material(
         permittivity = ConstantPermittivity(value=CARDBOARD)
     else:
         row = "plasterboard" if name == "drywall" else name
-        permittivity = itu_permittivity(row, frequencies)
+        permittivity = itu_permittivity(row, frequencies, beyond=beyond)
     return Dielectric(
         permittivity=permittivity, thickness=THICKNESS[name] if thickness is None else thickness
     )

@@ -5,7 +5,7 @@ exp(+jωt), so losses have :math:`\varepsilon'' > 0`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -172,14 +172,24 @@ band, the first is used."""
 
 
 def itu_permittivity(
-    name: str, frequencies: Float[np.ndarray, " freqs"]
+    name: str, frequencies: Float[np.ndarray, " freqs"], *, beyond: bool = False
 ) -> PowerLawPermittivity | JoinedPermittivity:
     """Pick the row of ITU-R P.2040-4 that covers the whole band, or join two that meet in it.
+
+    Parameters
+    ----------
+    name
+        Of the material.
+    frequencies
+        The band. [Hz]
+    beyond
+        Whether a band that no row covers is taken from the nearest rows: between two rows both laws
+        are averaged as where two meet, below the lowest and above the highest the law goes on.
 
     Raises
     ------
     MaterialError
-        If there is no such material, or no row for the band.
+        If there is no such material, or no row for the band and none may be taken.
     """
     if name not in ITU_ROWS:
         raise MaterialError(f"unknown ITU material {name!r}; known: {', '.join(ITU_ROWS)}")
@@ -209,11 +219,28 @@ def itu_permittivity(
         for upper in filter(ends, laws):
             if upper.lowest <= WIDEST_GAP * (1 + ROUNDING) * lower.highest:
                 return JoinedPermittivity(lower=lower, upper=upper)
+    if beyond:
+        return _nearest(laws, low * 1e9, high * 1e9)
     rows = ", ".join(f"{row[0]:g}-{row[1]:g}" for row in ITU_ROWS[name])
     raise MaterialError(
         f"material {name!r}: no row of ITU-R P.2040-4 covers {low:g}-{high:g} GHz (rows: {rows} "
-        "GHz); give the permittivity itself, or a table"
+        "GHz); give the permittivity itself, a table, or beyond_itu = true with its name and thickness "
+        "(for a foreign scene: in [geometry]): the nearest rows then"
     )
+
+
+def _nearest(
+    laws: list[PowerLawPermittivity], low: float, high: float
+) -> PowerLawPermittivity | JoinedPermittivity:
+    """Extend the laws nearest to a band over it; frequencies in Hz."""
+    below = [law for law in laws if law.lowest <= low]
+    above = [law for law in laws if high <= law.highest]
+    lower = max(below, key=lambda law: law.highest, default=None)
+    upper = min(above, key=lambda law: law.lowest, default=None)
+    if lower is not None and upper is not None:
+        return JoinedPermittivity(lower=lower, upper=upper)
+    nearest = lower or upper or laws[0]
+    return replace(nearest, lowest=min(nearest.lowest, low), highest=max(nearest.highest, high))
 
 
 def read_permittivity(path: Path) -> TabulatedPermittivity:

@@ -101,8 +101,7 @@ def over_flat_faces(
     outer = _outer(receive)
     pairs = _Pairs(scene, scene.mirrors.mirrors, send, receive)
     candidates = []
-    facing = _facing(scene.mirrors.mirrors)
-    possible = [one for one in sequences if all(facing[a, b] for a, b in pairwise(one))]
+    possible = _facing(scene.mirrors.mirrors, list(sequences))
     if len(possible) > MOST_NEAR:
         possible = [one for one in possible if pairs.mirrored(one, outer)]
     for sequence in possible:
@@ -123,15 +122,30 @@ def over_flat_faces(
     return total
 
 
-def _facing(mirrors: Mirrors) -> Bool[np.ndarray, "mirrors mirrors"]:
-    """Tell which mirrors have parts on the reflecting sides of each other."""
-    before = np.empty((len(mirrors), len(mirrors)), dtype=bool)
-    for mirror in range(len(mirrors)):
-        heights = mirrors.heights(mirrors.corners, mirror)
-        before[mirror] = (
-            np.abs(heights) if mirrors.two_sided[mirror] else heights
-        ).max(axis=1) > ON_PLANE  # fmt: skip
-    return before & before.T
+def _facing(mirrors: Mirrors, sequences: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Keep the sequences of which each mirror has parts on the reflecting side of the next.
+
+    Pairs are tested as they occur: a town has ten thousand mirrors, and few of them in sequence.
+    """
+    pairs = {(min(pair), max(pair)) for one in sequences for pair in pairwise(one)}
+    if not pairs:
+        return sequences
+    first, second = np.array(sorted(pairs)).T
+    facing = _before(mirrors, first, second) & _before(mirrors, second, first)
+    good = set(zip(first[facing].tolist(), second[facing].tolist(), strict=True))
+    return [
+        one for one in sequences if all((min(p), max(p)) in good for p in pairwise(one))
+    ]
+
+
+def _before(
+    mirrors: Mirrors, some: Int[np.ndarray, " pairs"], others: Int[np.ndarray, " pairs"]
+) -> Bool[np.ndarray, " pairs"]:
+    """Tell of which mirrors the others have parts on the reflecting side."""
+    from_plane = mirrors.corners[others] - mirrors.corners[some, :1]
+    heights = np.einsum("pcx,px->pc", from_plane, mirrors.normals[some])
+    heights = np.where(mirrors.two_sided[some, None], np.abs(heights), heights)
+    return np.asarray(heights.max(axis=1) > ON_PLANE)
 
 
 def _outer(group: AntennaGroup) -> Int[np.ndarray, " some"]:

@@ -232,7 +232,9 @@ def _material(material: str | Slab, frequencies: Float[np.ndarray, " freqs"]) ->
     if isinstance(material, str):
         return named_material(material, frequencies)
     if material.name is not None:
-        return named_material(material.name, frequencies, thickness=material.thickness)
+        return named_material(
+            material.name, frequencies, thickness=material.thickness, beyond=material.beyond_itu
+        )
     permittivity: Permittivity
     if material.permittivity is not None:
         real, loss = material.permittivity

@@ -95,6 +95,9 @@ def test_a_rotation_about_any_axis_keeps_lengths_and_the_axis(folder: Path) -> N
 def test_to_look_at_a_point_turns_as_mitsuba_turns(folder: Path) -> None:
     import mitsuba as mi
 
+    from estimator.compute import engine
+
+    mi.set_variant(engine.mitsuba_variant())
     origin, target, up = [0.3, -0.5, 1.0], [2.0, 1.0, 0.4], [0.1, 0.2, 1.0]
     step = " ".join(
         f'{name}="{", ".join(map(str, values))}"'
@@ -180,6 +183,18 @@ def test_a_radio_material_brings_its_numbers(folder: Path, two_sided: bool) -> N
         material = f'<bsdf type="twosided" id="mat-paint">{inner}</bsdf>'
     (found,) = read_mitsuba_xml(scene(folder, material + SHAPE.format(file="wall.ply", more="")))
     assert found.material.slab == RadioSlab(permittivity=2.5, conductivity=0.02, thickness=0.1)
+
+
+def test_long_names_are_shortened_and_stay_apart(folder: Path) -> None:
+    street = "Strasse_" * 10
+    both = "".join(
+        SHAPE.format(file="wall.ply", more="").replace("mesh-wall", f"mesh-{street}{end}")
+        for end in ("north", "south")
+    )
+    names = [found.name for found in read_mitsuba_xml(scene(folder, MATERIAL + both))]
+    assert [len(name) for name in names] == [64, 64]
+    assert names[0] != names[1]
+    assert all(name.startswith("Strasse_Strasse_") for name in names)
 
 
 def test_names_become_keys_of_a_scenario(folder: Path) -> None:

@@ -134,3 +134,24 @@ def test_a_conductivity_is_the_loss_of_its_displacement_current() -> None:
     made = PowerLawPermittivity.of_conductivity(2.1, 0.01)(frequencies)
     np.testing.assert_allclose(made.real, 2.1)
     np.testing.assert_allclose(permittivity.conductivity(made, frequencies), 0.01, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("ghz", "lowest", "highest"),
+    [((60.0, 61.0), 3.91, 4.15), ((0.5, 0.6), 3.91, 3.91), ((400.0, 410.0), 4.15, 4.15)],
+)
+def test_beyond_its_rows_a_material_takes_the_nearest_ones(
+    ghz: tuple[float, float], lowest: float, highest: float
+) -> None:
+    band = 1e9 * np.array(ghz)
+    with pytest.raises(MaterialError, match="beyond_itu = true"):
+        permittivity.itu_permittivity("brick", band)
+    values = permittivity.itu_permittivity("brick", band, beyond=True)(band)
+    assert ((values.real >= lowest) & (values.real <= highest)).all()
+    assert (values.imag < 0).all()
+
+
+def test_where_a_row_covers_the_band_nothing_is_taken_from_beyond() -> None:
+    band = np.array([20e9, 30e9])
+    allowed = permittivity.itu_permittivity("brick", band, beyond=True)(band)
+    np.testing.assert_array_equal(allowed, permittivity.itu_permittivity("brick", band)(band))
