@@ -51,15 +51,23 @@ def scenes(
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of scenario files.")
     ] = False,
+    new: Annotated[
+        Path | None,
+        typer.Option("--new", metavar="FILE.toml", help="Write a scenario of your own, commented."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the built-in scenarios, or look at, draw or export one."""
+    """List the built-in scenarios, or look at, draw or export one, or begin a new one."""
     with told_clearly():
         from mmslam.commands import scenarios as commands
         from scenes.files.loading import scenario_schema
 
         if schema:
             print_json(scenario_schema())
+        elif new is not None:
+            if name is not None or show or overrides or export is not None:
+                raise typer.BadParameter("--new writes a file of its own: nothing else with it")
+            commands.write_new(new, as_json=as_json)
         elif name is None:
             if show or overrides:
                 raise typer.BadParameter("--show and --set need the NAME of a scenario")

@@ -1,6 +1,7 @@
 """Listing, drawing and exporting scenarios."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import typer
@@ -12,6 +13,7 @@ from mmslam.terminal.exit_codes import stdout_kept_clean
 from scenes.files.loading import scenario_to_toml
 from scenes.files.relocatable import relocatable
 from scenes.scenario import Scenario
+from scenes.schema.quantities import FORBIDDEN_IN_NAMES
 
 
 def list_scenarios(*, export: Path | None, as_json: bool) -> None:
@@ -64,6 +66,23 @@ def show_scenario(
             typer.echo(visible(str(path)))
     else:
         typer.echo(visible(scenario_to_toml(scenario).rstrip()))
+
+
+def write_new(path: Path, *, as_json: bool) -> None:
+    """Write a commented scenario, which simulates as it is, to be changed.
+
+    Raises
+    ------
+    OutputError
+        If the file exists with other content, or its name is no TOML file's.
+    """
+    if path.suffix != ".toml":
+        raise OutputError(f"--new {path}: a scenario is a TOML file; call it {path.stem}.toml")
+    name = "".join("_" if sign in FORBIDDEN_IN_NAMES else sign for sign in path.stem)
+    template = files("mmslam").joinpath("templates/new_scenario.toml").read_text(encoding="utf-8")
+    text = template.replace("NAME", name, 1)
+    _write_new(path, text.encode())
+    typer.echo(json_text({"file": str(path)}) if as_json else visible(str(path)))
 
 
 def _export_toml(scenario: Scenario, folder: Path) -> list[Path]:

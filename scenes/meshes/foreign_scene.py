@@ -45,8 +45,8 @@ class Geometry(Checked):
     )
     beyond_itu: bool = Field(
         False,
-        description="whether bands that ITU-R P.2040-4 does not cover for one of the file's materials "
-        "are taken from its nearest rows",
+        description="whether bands that ITU-R P.2040-4 does not cover for one of the file's "
+        "materials are taken from its nearest rows",
     )
     materials: dict[str, dict[str, Any]] = Field(
         default_factory=dict,

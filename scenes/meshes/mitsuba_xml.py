@@ -304,8 +304,8 @@ def _to_world(path: Path, element: ElementTree.Element) -> Float[np.ndarray, "4 
 def _key(name: str) -> str:
     """Replace what a name in a scenario must not hold: Blender's 'Cube.001' is Cube_001.
 
-    The end of one that is too long gives way to eight hexadecimal digits of the whole, so that names
-    that differ at their ends stay apart.
+    The end of one that is too long gives way to eight hexadecimal digits of the whole, so that
+    names that differ at their ends stay apart.
     """
     plain = "".join(
         "_" if sign in FORBIDDEN_IN_NAMES or not sign.isprintable() else sign for sign in name

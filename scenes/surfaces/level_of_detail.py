@@ -22,8 +22,8 @@ be a mirror of its own, and every pair of them a chain. A room of 3000 triangles
 Chosen. [-]"""
 
 MOST_ROUND = 2**24
-"""Facets of something round beyond which its flat faces are mirrors after all, as in Sionna RT's path
-solver: terrain and roofs of a town, of which facets would take hours. Chosen. [-]"""
+"""Facets of something round beyond which its flat faces are mirrors after all, as in Sionna RT's
+path solver: terrain and roofs of a town, of which facets would take hours. Chosen. [-]"""
 
 
 def flat_and_smooth(body: Body, wavelength: float) -> bool:

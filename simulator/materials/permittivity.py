@@ -224,8 +224,8 @@ def itu_permittivity(
     rows = ", ".join(f"{row[0]:g}-{row[1]:g}" for row in ITU_ROWS[name])
     raise MaterialError(
         f"material {name!r}: no row of ITU-R P.2040-4 covers {low:g}-{high:g} GHz (rows: {rows} "
-        "GHz); give the permittivity itself, a table, or beyond_itu = true with its name and thickness "
-        "(for a foreign scene: in [geometry]): the nearest rows then"
+        "GHz); give the permittivity itself, a table, or beyond_itu = true with its name and "
+        "thickness (for a foreign scene: in [geometry]), which takes the nearest rows"
     )
 
 

@@ -133,9 +133,7 @@ def _facing(mirrors: Mirrors, sequences: list[tuple[int, ...]]) -> list[tuple[in
     first, second = np.array(sorted(pairs)).T
     facing = _before(mirrors, first, second) & _before(mirrors, second, first)
     good = set(zip(first[facing].tolist(), second[facing].tolist(), strict=True))
-    return [
-        one for one in sequences if all((min(p), max(p)) in good for p in pairwise(one))
-    ]
+    return [one for one in sequences if all((min(p), max(p)) in good for p in pairwise(one))]
 
 
 def _before(

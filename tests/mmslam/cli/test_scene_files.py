@@ -87,3 +87,26 @@ def test_every_scenario_is_exported_with_the_meshes_it_needs() -> None:
     assert names == set(scenario_names())
     for name in names:
         assert mmslam("scenes", f"moved/{name}.toml")[0] == 0
+
+
+def test_a_new_scenario_is_written_without_a_question_and_simulates(tmp_path: Path) -> None:
+    code, told, _ = mmslam("scenes", "--new", "my.room.toml")
+    assert (code, told.strip()) == (0, "my.room.toml")
+    path = tmp_path / "my.room.toml"
+    assert path.read_text().count("#") > 20  # it is commented
+    code, told, _ = mmslam("simulate", "my.room.toml", "-o", "m.zarr", "--json")
+    assert code == 0
+    assert json.loads(told)["users"] == ["ann"]
+
+
+def test_a_new_scenario_replaces_no_other_file(tmp_path: Path) -> None:
+    assert json.loads(mmslam("scenes", "--new", "room.toml", "--json")[1]) == {"file": "room.toml"}
+    assert mmslam("scenes", "--new", "room.toml")[0] == 0  # the same again
+    (tmp_path / "room.toml").write_text("name = 'mine'")
+    code, _, told = mmslam("scenes", "--new", "room.toml")
+    assert code == 2
+    assert "exists with other content" in told
+    code, _, told = mmslam("scenes", "--new", "room.json")
+    assert code == 2
+    assert "call it room.toml" in told
+    assert mmslam("scenes", "slam_2d", "--new", "other.toml")[0] == 2

@@ -20,11 +20,11 @@ LONGEST = 400.0
 """Time after which a scene is given up, where several programs share the cores. [s]"""
 
 MEMORY = 10 * 2**30
-"""Address space that a scene may take; 6 GiB of memory are allowed, LLVM reserves some more. [byte]"""
+"""Address space that a scene may take; 6 GiB are allowed, and LLVM reserves more. [byte]"""
 
 COLUMNS = (
-    "scene", "ghz", "loads", "simulates", "load_cpu_s", "cpu_s", "wall_s", "gib", "echo_db", "pilot",
-    "paths", "alone", "length_um", "level_db", "told",
+    "scene", "ghz", "loads", "simulates", "load_cpu_s", "cpu_s", "wall_s", "gib", "echo_db",
+    "pilot", "paths", "alone", "length_um", "level_db", "told",
 )  # fmt: skip
 
 

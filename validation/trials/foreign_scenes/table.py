@@ -130,7 +130,9 @@ def _matched(
     Levels are in dB, lengths in m. Sionna finds a path over an edge of two triangles twice.
     """
     ours = _our_paths(made, user)
-    theirs = [(float(d) * speed_of_light, abs(complex(g))) for d, g in zip(delays, gains, strict=True)]
+    theirs = [
+        (float(d) * speed_of_light, abs(complex(g))) for d, g in zip(delays, gains, strict=True)
+    ]
     strongest = max((level for _, level in [*ours, *theirs]), default=0.0)
     least = strongest * 10 ** (-FAINT_DB / 20)
     matched, alone = [], 0
