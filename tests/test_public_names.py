@@ -27,6 +27,7 @@ EAGER = {
     "validation/experiments": "programs, run by their names",
     "validation/experiments/full_wave": "the same",
     "validation/reference": "two paths",
+    "validation/trials/foreign_scenes": "a program, run by its name",
 }
 """Packages without lazy names, and why."""
 

@@ -62,11 +62,23 @@ def room(tmp_path: Path) -> Path:
 PAINTED = {"paint": {"material": "drywall", "roughness": {"rms_mm": 0.0, "correlation_mm": 1.0}}}
 
 
+def test_beyond_itu_holds_for_all_materials_of_the_file(room: Path) -> None:
+    geometry = {"file": str(room), "beyond_itu": True}
+    found = scenario(geometry | {"materials": {"paint": {"material": "metal"}}})
+    assert found.objects["plate"].material == Slab.model_validate(
+        {"name": "wood", "thickness_mm": 100.0, "beyond_itu": True}
+    )
+    unnamed = {"permittivity": [2.0, 0.0], "thickness_mm": 1.0, "beyond_itu": True}
+    with pytest.raises(ScenarioError, match="beyond_itu = true is about named materials"):
+        scenario({"file": str(room), "materials": {"paint": {"material": unnamed}}})
+
+
 def test_a_foreign_scenes_shapes_become_objects(room: Path) -> None:
     found = scenario({"file": str(room), "materials": PAINTED})
     assert list(found.objects) == ["box", "plate"]
     box, plate = found.objects["box"], found.objects["plate"]
-    assert (box.material, plate.material) == ("drywall", "wood")
+    board = Slab.model_validate({"name": "wood", "thickness_mm": 100.0})  # Sionna's own default
+    assert (box.material, plate.material) == ("drywall", board)
     assert isinstance(plate, MeshFile)
     np.testing.assert_allclose(placed_mesh(plate).bounds, [[-2, 3.5, -1], [2, 3.5, 1]])
 
