@@ -15,18 +15,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import crossing, mirrored
 from estimator.walls.fitted_line import FittedLine
 
 FACETS = 48
 """Places along a wall over which a cloud's ways are tried, the straight way included: their
 pairs fill the cloud. Of the points in clouds of four times as many, 1.1 % are left out (``python
 -m validation.experiments.thresholds limits``); the time grows with the square. [-]"""
-BRIGHTER = 10.0
-"""Least intensity of a point over that of the line which it makes of a wall: 3600 in one room, of a
-post 1 cm thick. [-]"""
-FAINTER = 10.0
-"""Most intensity of such a line over the wall's own echo: two in that room were 1.0 and 1.3; a wall
-may scatter more towards the point than back. [-]"""
+FAINTER = 4.0
+"""Most intensity of a line over that of the point which makes it of a wall: where the wall
+reflects, both ways round come back together, each as strong as the point itself. [-]"""
 MOST = 0.5
 """Share of a line from which most of it is meant. [-]"""
 MARGIN = 2.0
@@ -98,11 +96,15 @@ def without_scattered_twice(
     levels: Float[np.ndarray, " points"],
     resolution: Resolution,
 ) -> tuple[FittedLine, ...]:
-    """Leave out lines that are a wall's echo by way of a bright point.
+    """Leave out lines that are a wall's echo by way of a bright point, or over another wall.
 
     What goes out to a point, on to a rough wall's facet and back from there (or the other way
     round) appears at half the way's length and at the mean sine of point and facet: a line, as
     sharp as the wall.
+
+    What goes out to a wall's facet straight and comes back over a mirror (or the other way round)
+    appears at the mean range and the mean sine of the facet and its image. The wall may be too
+    steep to be seen itself, but for an end: then the line begins where that end appears so.
 
     Parameters
     ----------
@@ -119,13 +121,13 @@ def without_scattered_twice(
     for line in lines:
         share = (np.arange(FACETS) + 0.5) / FACETS
         places = line.start + share[:, None] * (line.end - line.start)
-        bright = points[levels > BRIGHTER * line.level]
-        walls = [one for one in lines if one is not line and one.level > line.level / FAINTER]
+        bright = points[FAINTER * levels > line.level]
+        walls = [one for one in lines if one is not line]
         if not any(
             np.mean(_by_way_of(places, point, wall, resolution)) > MOST
             for wall in walls
             for point in bright
-        ):
+        ) and not any(_begins_over(line, points, wall, resolution) for wall in walls):
             kept.append(line)
     return tuple(kept)
 
@@ -147,6 +149,27 @@ def _by_way_of(
         np.abs(seen_reach[:, None] - ranges) < MARGIN * resolution.along_ray
     )
     return np.asarray(near.any(axis=1))
+
+
+def _begins_over(
+    line: FittedLine,
+    points: Float[np.ndarray, "points 3"],
+    mirror: FittedLine,
+    resolution: Resolution,
+) -> bool:
+    """Tell whether a line begins where a mirror makes a mixed echo of a bright point."""
+    margin = MARGIN * float(resolution.cell(mirror.middle, mirror.direction))
+    start, end = (
+        mirror.start - margin * mirror.direction,
+        mirror.end + margin * mirror.direction,
+    )
+    ends = np.stack([line.start, line.end])
+    for point, image in zip(points, mirrored(points, mirror.start, mirror.end), strict=True):
+        reach = float(np.linalg.norm(image))
+        met = crossing(np.zeros(3), image / reach, start, end)
+        if met is not None and met[0] < reach and between(ends, point, image, resolution).any():
+            return True
+    return False
 
 
 def _polar(

@@ -63,7 +63,7 @@ def build_room_map(echo: Echo) -> RoomMap:
     cleaned = without_sources_aside(prepared)
     looked = survey(cleaned.prepared.echo, prepared=cleaned.prepared, values=cleaned.image)
     resolution = echo_resolution(echo)
-    lines = detect_mirrors(echo, looked, prepared=prepared)
+    lines = detect_mirrors(echo, looked, prepared=prepared, aside=cleaned)
     loose = unassigned_peaks(echo, looked, lines)[:MOST_POINTS]
     points = np.concatenate([loose, cleaned.places])
     levels = np.abs(focus(prepared.tapered, points)) ** 2

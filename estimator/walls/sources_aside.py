@@ -16,7 +16,7 @@ References
        baselines", Astronomy and Astrophysics Supplement 15, 1974.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
 import numpy as np
@@ -26,6 +26,8 @@ from scipy.linalg import cho_solve
 from scipy.ndimage import maximum_filter, maximum_filter1d
 
 from estimator.array.linear_array import WIDEST_SINE, echo_resolution, imaged_sine
+from estimator.array.resolution_cell import Resolution
+from estimator.geometry.wall_2d import unit_normal
 from estimator.imaging.focusing import PreparedEcho
 from estimator.imaging.peak_detection import mean_background
 from estimator.imaging.survey_2d import STEP, focus_sector, sector_points, survey_grid
@@ -63,6 +65,10 @@ CELLS_DEEP = 2.25
 """How far they go on before and behind the source. [cells]"""
 CELLS_BESIDE = 4.0
 """How far they go on to either side, beside half the aperture. [cells]"""
+OWN = 4.0
+"""Distance from a line's extension within which a source is a part of the same wall: its direction
+is known to a cell or so over its length, and the wall may go on beyond the sector for as far again.
+[cells]"""
 MOST_SCATTERERS = 600
 """Scatterers about one source, for time: of larger apertures less is covered. [-]"""
 
@@ -78,6 +84,38 @@ class Cleaned:
     places: Float[np.ndarray, "sources 3"]  # where they are [m]
     image: Complex[np.ndarray, "ranges sines"] | None
     """Tapered, on the survey's grid; ``None`` if it is not known. [-]"""
+    taken: tuple[Complex[np.ndarray, "positions freqs"], ...] = ()  # each source's echo
+    _kept: dict[tuple[int, ...], PreparedEcho] = field(default_factory=dict)
+
+    def with_those_on(
+        self,
+        start: Float[np.ndarray, " 3"],
+        end: Float[np.ndarray, " 3"],
+        resolution: Resolution,
+    ) -> PreparedEcho:
+        """Return the echo without the sources that are not on the line through two points.
+
+        A wall may go on beyond the sector and be bright there; where something else is bright, its
+        lobes go on beside the wall.
+        """
+        middle, normal = 0.5 * (start + end), unit_normal(start, end)
+        own = tuple(
+            number
+            for number, place in enumerate(self.places)
+            if abs(float((place - middle) @ normal)) < OWN * float(resolution.cell(place, normal))
+        )
+        if not own:
+            return self.prepared
+        if own not in self._kept:
+            echo = self.prepared.echo
+            back = np.sum([self.taken[number] for number in own], axis=0)
+            self._kept[own] = PreparedEcho(replace(echo, samples=echo.samples + back))
+        return self._kept[own]
+
+
+def nothing_aside(prepared: PreparedEcho) -> Cleaned:
+    """Return an echo as it is."""
+    return Cleaned(prepared=prepared, strongest=0.0, places=np.zeros((0, 3)), image=None)
 
 
 def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
@@ -91,7 +129,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     echo = prepared.echo
     limit = imaged_sine(echo)
     if limit >= WIDEST_SINE:
-        return Cleaned(prepared=prepared, strongest=0.0, places=np.zeros((0, 3)), image=None)
+        return nothing_aside(prepared)
     ranges, sines = survey_grid(echo, WIDEST_SINE)
     points = sector_points(ranges[:, None], sines)
     inner = len(survey_grid(echo, limit)[1])
@@ -102,6 +140,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
     rows = int(np.ceil(near / (STEP * echo_resolution(echo).along_ray)))
     places: list[Float[np.ndarray, " 3"]] = []
     dominant = []
+    taken: list[Complex[np.ndarray, "positions freqs"]] = []
     strongest = 0.0
     image = None
     for _ in range(MOST_SOURCES):
@@ -119,14 +158,17 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
         place = points.reshape(-1, 3)[brightest]
         places.append(place)
         strongest = max(strongest, float(intensity.flat[brightest]))
-        left = echo.samples - _source_echo(echo, place)
+        taken.append(_source_echo(echo, place))
+        left = echo.samples - taken[-1]
         if np.linalg.norm(left) ** 2 < (1 - MOST_OF_IT) * np.linalg.norm(echo.samples) ** 2:
-            dominant.append(place)
+            dominant.append(len(places) - 1)
         echo, image = replace(echo, samples=left), None
         prepared = PreparedEcho(echo)
     # What was fitted while others were there is left in part.
-    for place in dominant:
-        echo, image = replace(echo, samples=echo.samples - _source_echo(echo, place)), None
+    for number in dominant:
+        more = _source_echo(echo, places[number])
+        taken[number] = taken[number] + more
+        echo, image = replace(echo, samples=echo.samples - more), None
     if dominant:
         prepared = PreparedEcho(echo)
     return Cleaned(
@@ -134,6 +176,7 @@ def without_sources_aside(prepared: PreparedEcho) -> Cleaned:
         strongest=strongest,
         places=np.array(places).reshape(-1, 3),
         image=None if image is None else image[:, within],
+        taken=tuple(taken),
     )
 
 

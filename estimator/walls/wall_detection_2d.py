@@ -31,6 +31,7 @@ from estimator.walls.line_relations import (
 )
 from estimator.walls.line_sampling import median_level
 from estimator.walls.ridge_detection import RIDGE_LEVEL, find_ridges
+from estimator.walls.sources_aside import Cleaned, nothing_aside
 
 LEAST_COHERENCE = 0.02
 """Least coherence factor of a peak: sidelobes, and things nearer than the array is long, have 1/M
@@ -92,7 +93,11 @@ LEAST_CELLS = 8.0
 
 
 def detect_mirrors(
-    echo: Echo, looked: Survey, *, prepared: PreparedEcho | None = None
+    echo: Echo,
+    looked: Survey,
+    *,
+    prepared: PreparedEcho | None = None,
+    aside: Cleaned | None = None,
 ) -> tuple[FittedLine, ...]:
     """Find the walls that the image shows; the strongest first.
 
@@ -104,6 +109,9 @@ def detect_mirrors(
         Its survey.
     prepared
         The echo, if it was looked at before.
+    aside
+        The same without bright sources beyond the imaged sector, if they were looked for: where a
+        wall leaves the sector, it is followed without the lobes of those that are not on it.
 
     Returns
     -------
@@ -124,7 +132,8 @@ def detect_mirrors(
     plain, tapered = (focus_within(one, farthest) for one in (ready.plain, ready.tapered))
     profiles = ready.plain.profiles
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
-    certain, doubtful = _fitted(echo, looked, candidates, plain, tapered, profiles)
+    seen = nothing_aside(ready) if aside is None else aside
+    certain, doubtful = _fitted(echo, looked, candidates, seen, profiles)
     lines = [line for line in _best_of(certain, coarse) if not is_edge_on(line, half)]
     lines = _cut_where_they_cross(lines, echo_resolution(echo), plain, tapered)
     in_sight = [line for line in lines if not is_hidden(line, lines)]
@@ -138,7 +147,7 @@ def detect_mirrors(
         dtype=bool,
     )
     ghosts = find_lines(looked.peaks[one_wave & ~looked.bent & behind], coarse)
-    certain, more = _fitted(echo, looked, ghosts, plain, tapered, profiles)
+    certain, more = _fitted(echo, looked, ghosts, seen, profiles)
     # What the peaks leave in doubt, an image of it over a wall proves.
     proved = seen_twice(_best_of([*doubtful, *more], coarse), in_sight, echo_resolution(echo))
     in_sight += [
@@ -161,8 +170,7 @@ def _fitted(
     echo: Echo,
     looked: Survey,
     candidates: Sequence[LineCandidate],
-    plain: Focus,
-    tapered: Focus,
+    seen: Cleaned,
     profiles: RangeProfiles,
 ) -> tuple[list[FittedLine], list[FittedLine]]:
     """Fit candidates that are no part of a line that was fitted.
@@ -174,7 +182,7 @@ def _fitted(
     resolution = echo_resolution(echo)
     coarse = coarse_resolution(resolution)
     trials = looked.values.shape[0] * looked.values.shape[1]
-    half = 0.5 * float(np.ptp(echo.positions[:, 0]))
+    half, farthest = 0.5 * float(np.ptp(echo.positions[:, 0])), echo_reach(echo)[1]
     lines: list[FittedLine] = []
     doubtful: list[FittedLine] = []
     for candidate in candidates:
@@ -182,6 +190,8 @@ def _fitted(
         known = [[lies_on(end, line, coarse, margin=BEYOND_END) for end in ends] for line in lines]
         if any(all(on) for on in known):
             continue  # a part of a wall that was followed to its ends already
+        around = seen.with_those_on(candidate.start, candidate.end, coarse)
+        plain, tapered = (focus_within(one, farthest) for one in (around.plain, around.tapered))
         line = _fitted_line(echo, candidate, plain, tapered, trials)
         if line is None or line.confidence < LEAST_CONFIDENCE:
             continue

@@ -80,7 +80,30 @@ def test_a_line_that_a_wall_makes_by_way_of_a_post_is_no_wall() -> None:
     twice = replace(WALL, start=by_way(0.1), end=by_way(0.4))
     posts, bright = post[None], np.array([100.0])
     assert without_scattered_twice([WALL, twice], posts, bright, RESOLUTION) == (WALL,)
+    # Where the wall reflects the post's echo, the line is as bright as the post.
+    flash = replace(twice, level=200.0)
+    assert without_scattered_twice([WALL, flash], posts, bright, RESOLUTION) == (WALL,)
     # Without anything as bright there, or a few cells beside, it is a wall.
-    assert len(without_scattered_twice([WALL, twice], posts, 0.01 * bright, RESOLUTION)) == 2
+    assert len(without_scattered_twice([WALL, twice], posts, 1e-3 * bright, RESOLUTION)) == 2
     moved = replace(twice, start=1.03 * twice.start, end=1.03 * twice.end)
     assert without_scattered_twice([WALL, moved], posts, bright, RESOLUTION) == (WALL, moved)
+
+
+def test_a_steep_wall_seen_on_one_way_over_a_mirror_is_no_wall_where_it_appears() -> None:
+    # Its face sends nothing straight back, and is not in the image; its end is.
+    end, other = np.array([0.2, 0.75, 0.0]), np.array([0.3, 0.85, 0.0])
+
+    def mixed(facet: np.ndarray) -> np.ndarray:
+        image = mirrored(facet, WALL.start, WALL.end)
+        sine = np.mean([place[0] / np.linalg.norm(place) for place in (facet, image)])
+        reach = np.mean([np.linalg.norm(place) for place in (facet, image)])
+        return np.asarray(reach * np.array([sine, np.sqrt(1 - sine**2), 0.0]))
+
+    seen = replace(WALL, start=mixed(other), end=mixed(end), level=0.1)
+    points, faint = end[None], np.array([1e-3])
+    assert without_scattered_twice([WALL, seen], points, faint, RESOLUTION) == (WALL,)
+    # An end of something else, or a mirror that ends before it reflects that end, tells nothing.
+    elsewhere = points + [0.03, 0.0, 0.0]
+    assert len(without_scattered_twice([WALL, seen], elsewhere, faint, RESOLUTION)) == 2
+    short = replace(WALL, start=on_wall(0.0), end=on_wall(0.2))
+    assert len(without_scattered_twice([short, seen], points, faint, RESOLUTION)) == 2

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from estimator.array.linear_array import imaged_sine
+from estimator.array.linear_array import echo_resolution, imaged_sine
+from estimator.array.resolution_cell import coarse_resolution
 from estimator.array.windows import survey_weights
 from estimator.imaging.backprojection import backproject
 from estimator.imaging.focusing import PreparedEcho
@@ -73,3 +74,14 @@ def test_a_source_within_the_sector_loses_nothing_to_its_own_lobes() -> None:
 def test_an_array_without_grating_lobes_keeps_its_echo() -> None:
     measured = echo([INSIDE, OUTSIDE], [1.0, 100.0], spacing=0.25e-3)
     assert without_sources_aside(PreparedEcho(measured)).prepared.echo is measured
+
+
+def test_a_line_is_followed_without_the_sources_that_are_not_on_it() -> None:
+    measured = echo([INSIDE, OUTSIDE], [1.0, 100.0])
+    found = without_sources_aside(PreparedEcho(measured))
+    resolution = coarse_resolution(echo_resolution(measured))
+    towards = 0.5 * (INSIDE + OUTSIDE)
+    along = found.with_those_on(INSIDE, towards, resolution).echo
+    np.testing.assert_allclose(along.samples, measured.samples, atol=1e-12)
+    across = np.array([-towards[1], towards[0], 0.0])
+    assert found.with_those_on(INSIDE, INSIDE + 0.2 * across, resolution) is found.prepared
