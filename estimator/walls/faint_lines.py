@@ -40,6 +40,12 @@ count as one. [-]"""
 CUT = 3.0
 """Distance from either end that is left out: an end is bright, and the survey's lobe ends at 1.4
 cells (:data:`estimator.walls.ridge_detection.ASIDE`). [cells]"""
+BESIDE_NOISE = 2.0
+"""Median beside a line, over that of noise, up to which it is noise: of n exponential intensities
+it errs by 1.44/√n, half of it for the fewest cells that count. [-]"""
+BESIDE_DEVIATION = 1.6
+"""Deviation of the mean over a line, relative to a median beside it, over that relative to noise,
+whose level is known: the median's own error moves the clipped mean x by 0.8 of it. [-]"""
 LEAST_CELLS = 8.0
 """Shortest part between: with fewer, only lines that single places show pass. [cells]"""
 
@@ -115,11 +121,16 @@ def _significance(
     resolution
         Of the image.
     """
-    clipped = np.minimum(over, CLIP) * free
 
-    def mean_over(places: Float[np.ndarray, "samples some 3"]) -> Float[np.ndarray, " some"]:
-        read = clipped.ravel()[_pixels(looked, places)].sum(axis=0)
-        return np.asarray(read / np.maximum(counts, 1))
+    def mean_over(
+        places: Float[np.ndarray, "samples some 3"], usual: Float[np.ndarray, "*some"]
+    ) -> Float[np.ndarray, " some"]:
+        pixels = _pixels(looked, places)
+        read = np.minimum(over.ravel()[pixels] / usual, CLIP) * free.ravel()[pixels]
+        return np.asarray(read.sum(axis=0) / np.maximum(counts, 1))
+
+    def median_over(places: Float[np.ndarray, "samples some 3"]) -> Float[np.ndarray, " some"]:
+        return np.asarray(np.median(over.ravel()[_pixels(looked, places)], axis=0))
 
     cut = CUT / cells
     shares = (cut[:, None] + (1 - 2 * cut)[:, None] * np.linspace(0, 1, SAMPLES)).T[..., None]
@@ -129,19 +140,22 @@ def _significance(
     mean = 1 - np.exp(-CLIP)
     variance = 1 - 2 * CLIP * np.exp(-CLIP) - np.exp(-2 * CLIP)
     deviation = np.sqrt(variance / np.maximum(independent, 1.0))
-    on = mean_over(places)
+    on = mean_over(places, np.ones(()))
     significance = np.where(independent >= LEAST_CELLS, (on - mean) / deviation, 0.0)
     # What is beside is read of the few that are bright.
     bright = np.flatnonzero(significance >= least)
-    on, counts, deviation, places = on[bright], counts[bright], deviation[bright], places[:, bright]
+    counts, deviation, places = counts[bright], deviation[bright], places[:, bright]
     along = (ends - starts)[bright]
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     normals = np.stack([along[:, 1], -along[:, 0], np.zeros(len(along))], axis=-1)
     normals = np.broadcast_to(normals, places.shape)
     aside = ASIDE * width_of(places, normals, resolution)[..., None] * normals
-    sides = np.maximum(mean_over(places + aside), mean_over(places - aside))
-    over_sides = (on - sides) / (np.sqrt(2) * deviation)
-    significance[bright] = np.minimum(significance[bright], over_sides)
+    usual = np.maximum(
+        1.0, np.maximum(*(median_over(places + one * aside) for one in (1, -1))) / np.log(2)
+    )
+    deviation *= np.where(usual > BESIDE_NOISE, BESIDE_DEVIATION, 1.0)
+    over_usual = (mean_over(places, usual) - mean) / deviation
+    significance[bright] = np.minimum(significance[bright], over_usual)
     return significance
 
 

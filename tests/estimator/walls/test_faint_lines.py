@@ -53,3 +53,28 @@ def test_noise_and_bright_points_have_no_faint_lines(world: Any) -> None:
         echo = world.echo(points, rng, snr_db=-10.0)
         coarse = coarse_resolution(echo_resolution(echo))
         assert not find_faint_lines(survey(echo), (), coarse)
+
+
+def test_a_wall_that_is_dark_in_half_of_its_length_is_found(world: Any) -> None:
+    # Cells of tens of decibels here, none there: the sides are dark all along.
+    rng = np.random.default_rng(5)
+    half = START + 0.45 * rng.random((1500, 1)) * (END - START)
+    ends = np.concatenate([np.repeat(one[None], 300, axis=0) for one in (START, END)])
+    echo = world.echo(np.concatenate([half, ends]), rng, snr_db=-12.0)
+    looked, coarse = survey(echo), coarse_resolution(echo_resolution(echo))
+    for line in find_faint_lines(looked, (), coarse)[:1]:
+        along = (END - START) / np.linalg.norm(END - START)
+        assert abs(np.cross(line.end - line.start, along)[2]) < 0.01
+        break
+    else:
+        raise AssertionError("no line")
+
+
+def test_a_cloud_of_speckle_has_no_faint_lines(world: Any) -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        cloud = np.column_stack([rng.uniform(-0.05, 0.05, 4000), rng.uniform(0.2, 0.3, 4000)])
+        points = np.column_stack([cloud, np.zeros(len(cloud))])
+        echo = world.echo(points, rng, snr_db=20.0)
+        coarse = coarse_resolution(echo_resolution(echo))
+        assert not find_faint_lines(survey(echo), (), coarse)
