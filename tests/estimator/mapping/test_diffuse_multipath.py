@@ -103,7 +103,7 @@ def test_a_steep_wall_seen_on_one_way_over_a_mirror_is_no_wall_where_it_appears(
     points, faint = end[None], np.array([1e-3])
     assert without_scattered_twice([WALL, seen], points, faint, RESOLUTION) == (WALL,)
     # An end of something else, or a mirror that ends before it reflects that end, tells nothing.
-    elsewhere = points + [0.03, 0.0, 0.0]
+    elsewhere = points + np.array([0.03, 0.0, 0.0])
     assert len(without_scattered_twice([WALL, seen], elsewhere, faint, RESOLUTION)) == 2
     short = replace(WALL, start=on_wall(0.0), end=on_wall(0.2))
     assert len(without_scattered_twice([short, seen], points, faint, RESOLUTION)) == 2
