@@ -20,8 +20,8 @@ and a candidate line is off by half a cell. [cells]"""
 BEYOND_END = 4.0
 """Distance beyond a line's end within which a peak belongs to it: the ends are found to a few
 cells, as speckle hides the last ones. ``python -m validation.experiments.thresholds walls``: of 72
-simulated walls the farthest peak was 2.5 cells beyond an end in five families of six, and 4.7
-cells once in the sixth, at 20°. [cells]"""
+simulated walls the farthest peak was 2.5 cells beyond an end in five families of six, and up to 4.7
+cells in the sixth, at 20°; no more than one wall in ten has one beyond. [cells]"""
 
 GOOD_PART = 1 / 3
 """Share of a line on another from which both are one wall, or behind others from which it is
