@@ -44,6 +44,7 @@ from simulator.specular.image_method import (
     folded_back,
     trace_chain,
 )
+from simulator.specular.many_sequences import leading_sequences
 from simulator.specular.path_field import Through, reflected_field
 from simulator.specular.rim_diffraction import rim_factor
 
@@ -103,6 +104,13 @@ def over_flat_faces(
     candidates = []
     possible = _facing(scene.mirrors.mirrors, list(sequences))
     if len(possible) > MOST_NEAR:
+        senders, receivers = pairs.ends(outer)
+        possible = leading_sequences(
+            scene.mirrors.mirrors,
+            possible,
+            np.concatenate([senders, senders]),
+            np.concatenate([receivers + NUDGE, receivers - NUDGE]),
+        )
         possible = [one for one in possible if pairs.mirrored(one, outer)]
     for sequence in possible:
         place = pairs.place(sequence)
