@@ -67,8 +67,12 @@ class Dataset:
         return drawn
 
     def to_xarray(self) -> xr.Dataset:
-        """Return all samples as one lazy dataset, in the layout of the file, without the truth."""
-        return self._root
+        """Return all samples as one lazy dataset, in the layout of the file, without the truth.
+
+        How the file divides them into chunks is left out: some samples, chosen by ``isel``, are
+        written by ``to_zarr`` or ``to_netcdf`` in chunks of their own.
+        """
+        return self._root.drop_encoding()
 
     @cached_property
     def _root(self) -> xr.Dataset:

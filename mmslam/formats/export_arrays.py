@@ -138,7 +138,8 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
     """Write a store as a MATLAB file of version 5; arguments as of :func:`export_netcdf`.
 
     Groups are structures. A key such as ``noise.snr_db`` is called ``noise_snr_db``; units and
-    other attributes are in the structure ``attributes``.
+    other attributes are in the structure ``attributes``. A script beside it, ``read_me_NAME.m``,
+    says what each variable is, and loads and plots the first sweep.
     """
     from scipy.io import savemat
 
@@ -163,9 +164,40 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
             _place(told, one.group)[_identifier(one.name)] = attributes
     about = {_identifier(key): value for key, value in _attributes(root.attrs.asdict()).items()}
     content["attributes"] = {**about, "variables": told}
+    script = file.with_name(f"{_identifier(f'read_me_{file.stem}')}.m")
+    with _new(script, "MATLAB") as part:
+        part.write_text(_read_me(file, arrays), encoding="utf-8")
     with _new(file, "MATLAB") as part:
         savemat(part, content, do_compression=True, long_field_names=True, appendmat=False)
     return len(arrays)
+
+
+def _read_me(file: Path, arrays: Sequence[StoredArray]) -> str:
+    """Write a MATLAB script that explains the variables of a file, and plots one sweep."""
+    lines = [
+        f"% What {file.name} holds. Time convention exp(+j w t): a delay t is exp(-2j pi f t)."
+    ]
+    for one in arrays:
+        names = [*one.group.split("/")] if one.group else []
+        place = ".".join([*names, _identifier(one.name)])
+        told = one.array.attrs.asdict()
+        about = " ".join(str(told[key]) for key in ("long_name", "units") if told.get(key))
+        size = " x ".join(map(str, one.dimensions)) or "scalar"
+        lines.append(f"%   {place:<32} {size}{f': {about}' if about else ''}")
+    quoted = file.name.replace("'", "''")
+    lines.append(f"m = load('{quoted}');")
+    for name in ("echo", "uplink"):
+        (array,) = [one for one in arrays if not one.group and one.name == name] or [None]
+        if array is None:
+            continue
+        first = ", ".join(["1"] * (len(array.dimensions) - 1) + [":"])
+        lines += [
+            f"sweep = m.{name}({first});",
+            "plot(m.frequency / 1e9, 20 * log10(abs(sweep(:))));",
+            "xlabel('frequency [GHz]'); ylabel('S-parameter [dB]');",
+        ]
+        break
+    return "\n".join(lines) + "\n"
 
 
 def _opened(store: Path) -> zarr.Group:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
@@ -240,6 +241,18 @@ def test_what_is_no_dataset_is_refused(tmp_path: Path, measurement: mmslam.Measu
     mmslam.write(tmp_path / "one.zarr", measurement)
     with pytest.raises(model.MeasurementError, match=r"read it with mmslam\.read"):
         mmslam.open_dataset(tmp_path / "one.zarr")
+
+
+def test_some_samples_of_a_dataset_are_written_by_xarray(tmp_path: Path) -> None:
+    small = {"base_station.elements": 4, "radio.points": 6}
+    config = {"base": "point_scatterers", "count": 5, "set": small}
+    mmslam.make_dataset(config, tmp_path / "all.zarr")
+    every = mmslam.open_dataset(tmp_path / "all.zarr").to_xarray()
+    some = every.isel(sample=slice(1, 4), frequency=[0, 2, 5])
+    some.to_zarr(tmp_path / "some.zarr", consolidated=False)
+    again = xr.open_zarr(tmp_path / "some.zarr", consolidated=False, chunks=None)
+    np.testing.assert_array_equal(again["echo"], every["echo"][1:4, :, [0, 2, 5]])
+    assert again["echo"].attrs == every["echo"].attrs
 
 
 def test_a_sweep_of_tables_gives_an_array_and_a_plot(tmp_path: Path) -> None:

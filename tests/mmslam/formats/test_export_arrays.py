@@ -98,3 +98,20 @@ def test_wrong_exports_are_refused(
     assert "it.mat exists; move it away" in refused(store, "--matlab", new)
     assert new.read_text() == "mine"
     assert [path.name for path in tmp_path.iterdir()] == ["it.mat"]
+
+
+def test_a_script_beside_says_what_each_variable_of_the_matlab_file_is(
+    store: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "some rooms.mat"
+    assert mmslam("export", store, "--matlab", file).exit_code == 0
+    told = (tmp_path / "read_me_some_rooms.m").read_text(encoding="utf-8")
+    described = [line.split()[1] for line in told.splitlines() if line.startswith("%   ")]
+    content = loadmat(file, simplify_cells=True)
+    for place in described:
+        here = content
+        for name in place.split("."):
+            here = here[name]
+    assert {"echo", "uplink", "frequency", "truth.user_position"} <= set(described)
+    assert "load('some rooms.mat')" in told
+    assert "m.echo(1, 1, :)" in told  # sample, position, frequency

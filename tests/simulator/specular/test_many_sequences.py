@@ -1,4 +1,4 @@
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_the_sequences_that_are_left_are_those_that_the_image_method_finds(
             one
             for length in (1, 2, 3)
             for one in product(range(len(mirrors)), repeat=length)
-            if all(a != b for a, b in zip(one[:-1], one[1:], strict=True))
+            if all(a != b for a, b in pairwise(one))
         ]
         exact = {
             chain.mirrors
