@@ -187,10 +187,10 @@ def _read_me(file: Path, arrays: Sequence[StoredArray]) -> str:
     quoted = file.name.replace("'", "''")
     lines.append(f"m = load('{quoted}');")
     for name in ("echo", "uplink"):
-        (array,) = [one for one in arrays if not one.group and one.name == name] or [None]
-        if array is None:
+        found = [one for one in arrays if not one.group and one.name == name]
+        if not found:
             continue
-        first = ", ".join(["1"] * (len(array.dimensions) - 1) + [":"])
+        first = ", ".join(["1"] * (len(found[0].dimensions) - 1) + [":"])
         lines += [
             f"sweep = m.{name}({first});",
             "plot(m.frequency / 1e9, 20 * log10(abs(sweep(:))));",
