@@ -1,0 +1,108 @@
+r"""Samples of the other time convention, told by their focus.
+
+Recorded as :math:`e^{-j\omega t}`, a wave of delay :math:`\tau` appears here with the delay
+:math:`c/\Delta f - \tau` (of a path), from the other side, and converging: nothing real does. Its
+samples' conjugate is focused, at the length and with the curvature that belong together; the
+samples are not. So both are focused at the delays that hold most energy, in all directions, and the
+brightest decides. A flat wave (from far away, or over a mirror that faces the array) is none of
+both: it is tried as well, and where it is brightest nothing is said.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.constants import speed_of_light
+
+from estimator.imaging.phase_curvature import aligned_profiles
+from estimator.imaging.range_compression import RangeProfiles, range_profiles
+from estimator.measurement.model import Echo, MeasurementError, Uplink
+
+BRIGHTER = 3.0
+"""Intensity of the conjugate's focus over that of the samples, from which they are of the other
+convention. Echoes and pilots of the rooms of :mod:`validation.trials.contradictory_data` and of
+five of the library have 1.0 at most, with half of the positions lost too, as any true wave is more
+like a flat one than like one that converges; conjugated, pilots over a rough wall near by have 2.1,
+all others 3.2 to 21. [-]"""
+DELAYS = 2
+"""Strongest delays at which is focused, for time: one decides. [-]"""
+NEAREST = 0.5
+"""Distance below which nothing is focused, over the array's extent. [-]"""
+WIDEST = 0.8
+"""Sine of the widest direction that is tried. [-]"""
+STEPS = 1.2
+"""Directions for each cell λ/nD: between two, a peak loses 2.6 dB, alike in both. [-]"""
+FLAT = 1e4
+"""Least distance of a point whose wave is flat: it bends by 0.08 rad over 1 m at 300 GHz. [m]"""
+
+
+def refuse_other_convention(data: Echo | Uplink, name: str) -> None:
+    """Refuse samples of a linear array that only their conjugate explains.
+
+    Parameters
+    ----------
+    data
+        In the array's frame: its line along x, boresight along y.
+    name
+        What it is called.
+
+    Raises
+    ------
+    MeasurementError
+        If the conjugate is focused brighter by :data:`BRIGHTER`.
+    """
+    ratio = brighter_conjugated(data)
+    if ratio > BRIGHTER:
+        raise MeasurementError(
+            f"{name}: all waves converge, and the conjugated samples are focused "
+            f"{10 * np.log10(ratio):.0f} dB brighter (the limit is {10 * np.log10(BRIGHTER):.0f} "
+            "dB): they are of the other time convention; import them with time_convention = "
+            '"exp(-jwt)", or conjugate them'
+        )
+
+
+def brighter_conjugated(data: Echo | Uplink) -> float:
+    """Return the brightest focus of the conjugate over that of the samples themselves. [-]."""
+    extent = float(np.ptp(data.positions[:, 0]))
+    wave = speed_of_light / float(data.frequencies[-1])
+    if len(data.positions) < 3 or extent < wave:
+        return 0.0
+    ways = 2 if isinstance(data, Echo) else 1
+    sines = np.arange(-WIDEST, WIDEST, wave / (STEPS * ways * extent))
+    same = range_profiles(data)
+    other = range_profiles(replace(data, samples=data.samples.conj()))
+    longest = same.unambiguous / ways
+    ranges = _strongest(same, NEAREST * extent * ways) / ways
+    flat = _brightest(same, ranges + longest * np.ceil(FLAT / longest), sines)
+    here = max(flat, _brightest(same, ranges, sines))
+    there = max(flat, _brightest(other, longest - ranges, sines))
+    return there / here if here > 0 else 0.0
+
+
+def _strongest(profiles: RangeProfiles, nearest: float) -> Float[np.ndarray, " lengths"]:
+    """Return the path lengths with most energy, not within a length of either end. [m]."""
+    energy = (np.abs(profiles.coefficients[..., 3]) ** 2).sum(axis=0).astype(float)
+    cells = energy.size
+    away = np.arange(cells) * profiles.cell
+    energy[np.minimum(away, profiles.unambiguous - away) < nearest] = 0.0
+    beside = max(2, cells // 200)
+    found: list[float] = []
+    while len(found) < DELAYS and energy.any():
+        at = int(np.argmax(energy))
+        found.append(float(away[at]))
+        energy[max(0, at - beside) : at + beside + 1] = 0.0
+    return np.array(found)
+
+
+def _brightest(
+    profiles: RangeProfiles,
+    ranges: Float[np.ndarray, " ranges"],
+    sines: Float[np.ndarray, " sines"],
+) -> float:
+    most = 0.0
+    for reach in ranges:
+        x, y = reach * sines, reach * np.sqrt(1 - sines**2)
+        points = np.stack([x, y, np.zeros_like(x)], axis=-1)
+        focused = np.abs(aligned_profiles(profiles, points, 0.0).sum(axis=-1)) ** 2
+        most = max(most, float(focused.max()))
+    return most
