@@ -19,6 +19,7 @@ from estimator.consistency.faulty_samples import without_faults
 from estimator.consistency.pilot_curvature import pilot_lateness
 from estimator.consistency.same_samples import refuse_same_samples
 from estimator.consistency.stated_heights import height_error
+from estimator.consistency.time_convention import refuse_other_convention
 from estimator.imaging.energy_region import middles
 from estimator.imaging.scene_image import ImageOptions
 from estimator.localization.clock import clock_note, on_our_clock
@@ -112,8 +113,8 @@ def locate(
     ------
     MeasurementError
         If there is one position only, pilots came to an array that is neither linear nor planar,
-        the frequency grid is not uniform, the waves are such as an array of its shape cannot
-        take, or a region is empty or comes without an echo.
+        the frequency grid is not uniform, samples are of the other time convention, the waves are
+        such as an array of its shape cannot take, or a region is empty or comes without an echo.
     """
     if measurement.echo is None and not measurement.uplinks:
         return _by_lists(measurement, region)
@@ -135,6 +136,11 @@ def locate(
     notes += [note for one in heard_by for note in one.notes]
     uplinks = tuple(one.data for one in heard_by)
     frame = stages.frame(measurement)
+    if isinstance(stages, LinearStages):
+        if echo is not None:
+            refuse_other_convention(local_echo(echo, frame), "echo")
+        for uplink in uplinks:
+            refuse_other_convention(local_uplink(uplink, frame), f"uplink of {uplink.user!r}")
     steps = 2 + len(uplinks) + bool(measurement.path_lists)
 
     tell("estimate", 0, steps)
