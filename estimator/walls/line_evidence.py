@@ -1,4 +1,4 @@
-r"""Three tests on the echo whether a line of the image is a wall.
+r"""Four tests on the echo whether a line of the image is a wall.
 
 *Explained share*. The row's strengths are fitted to all range profiles by least squares, as in
 :mod:`estimator.walls.line_fit_echo`. Echo and residual are then focused on cells along the line and
@@ -10,6 +10,8 @@ same ranges but other directions does not count.
 its range. A short line along an arc is told from it only by the reflection of the array.
 
 *Curvature*. Waves that were scattered twice are more curved than those of a wall there.
+
+*Unambiguous range*. The arc of a wave from beyond it is focused as from there.
 """
 
 from dataclasses import dataclass
@@ -21,7 +23,9 @@ from scipy.linalg import cho_solve
 from estimator.array.resolution_cell import Resolution
 from estimator.array.windows import SURVEY_TAPER, aperture_taper
 from estimator.imaging.phase_curvature import bent_intensities
+from estimator.imaging.range_alias import ARC, brightest_from_beyond
 from estimator.imaging.range_compression import RangeProfiles
+from estimator.imaging.survey_2d import STEP, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_sampling import trial_points
@@ -141,3 +145,25 @@ def _explained(echo: Echo, line: FittedLine, resolution: Resolution) -> float:
         )
         shares.append(float(np.median(1 - unexplained / seen)))
     return max(shares)
+
+
+def is_from_beyond(
+    line: FittedLine, looked: Survey, profiles: RangeProfiles, resolution: Resolution
+) -> bool:
+    """Tell whether a line is the arc of one wave from beyond the unambiguous range.
+
+    Parameters
+    ----------
+    line
+        In the array's frame.
+    looked
+        The survey, whose directions are tried.
+    profiles
+        Of the echo, not tapered.
+    resolution
+        Of the echo.
+    """
+    reach = [float(np.linalg.norm(place)) for place in (line.start, line.middle, line.end)]
+    ranges = np.arange(min(reach), max(reach), STEP * resolution.along_ray)
+    sines = looked.points[0, :, 0] / np.linalg.norm(looked.points[0], axis=-1)
+    return brightest_from_beyond(profiles, ranges, sines) > ARC

@@ -11,14 +11,13 @@ from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing
 from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
-from estimator.imaging.range_alias import ARC, brightest_from_beyond
 from estimator.imaging.range_compression import RangeProfiles
-from estimator.imaging.survey_2d import REFLECTED, STEP, Survey
+from estimator.imaging.survey_2d import REFLECTED, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_detection import LineCandidate, find_lines
-from estimator.walls.line_evidence import depth_of, examine, gain_by_bending
+from estimator.walls.line_evidence import depth_of, examine, gain_by_bending, is_from_beyond
 from estimator.walls.line_extent import face_ends
 from estimator.walls.line_fit_image import fit_between, fit_line
 from estimator.walls.line_relations import (
@@ -212,7 +211,7 @@ def _fitted(
         if oblique and gain_by_bending(profiles, line, resolution) > MOST_BY_BENDING:
             continue  # scattered twice
         plain_waves = _is_of_waves(line, looked, coarse)
-        if not plain_waves and _is_from_beyond(line, looked, profiles, resolution):
+        if not plain_waves and is_from_beyond(line, looked, profiles, resolution):
             continue
         least = EXPLAINED if plain_waves and not shallow else WELL_EXPLAINED
         certain = evidence.explained >= least and (plain_waves or not is_edge_on(line, half))
@@ -325,16 +324,6 @@ def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
     reflects = bool(np.any(looked.as_mirror[on] >= REFLECTED))
     coherent = np.maximum(looked.as_point, looked.as_mirror)[on]
     return reflects or float(np.median(coherent)) >= WALL_COHERENCE
-
-
-def _is_from_beyond(
-    line: FittedLine, looked: Survey, profiles: RangeProfiles, resolution: Resolution
-) -> bool:
-    """Tell whether a line is the arc of one wave from beyond the unambiguous range."""
-    reach = [float(np.linalg.norm(place)) for place in (line.start, line.middle, line.end)]
-    ranges = np.arange(min(reach), max(reach), STEP * resolution.along_ray)
-    sines = looked.points[0, :, 0] / np.linalg.norm(looked.points[0], axis=-1)
-    return brightest_from_beyond(profiles, ranges, sines) > ARC
 
 
 def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine]:
