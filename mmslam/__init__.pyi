@@ -4,6 +4,7 @@ from .commands.focus import image
 from .commands.sweep import sweep
 from .commands.track import track
 from .datasets import open_dataset
+from .deepmimo_folder import to_deepmimo
 from .full_wave import simulate_full_wave
 from .library import Scenario, load_scenario, scenarios
 from .location import locate
@@ -40,6 +41,7 @@ __all__ = [
     "simulate",
     "simulate_full_wave",
     "sweep",
+    "to_deepmimo",
     "to_sionna_cir",
     "track",
     "write",

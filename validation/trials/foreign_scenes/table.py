@@ -5,7 +5,6 @@ import time
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from scipy.constants import speed_of_light
 
 from scenes.files.loading import load_scenario
 from scenes.meshes.foreign_scene import sionna_scenes
-from scenes.scenario import Scenario, ScenarioError, User
+from scenes.scenario import Scenario, ScenarioError
 from validation.trials.foreign_scenes.shipped_scenes import PLACES, shipped_scenario
 
 FAINT_DB = 30.0
@@ -106,13 +105,18 @@ def _compared(made: Scenario, pilots: Mapping[str, np.ndarray], file: Path) -> d
         theirs = solved_pilots(made, file, frequencies)
     except (RuntimeError, ValueError) as error:
         return {"told": f"Sionna RT: {error}".splitlines()[0][:200]}
+    from simulator.scene.user_paths import user_paths
+
+    first = made.base_station.element_positions[0]
+    ours_by_user = user_paths(made, frequency=float(frequencies[-1]), place=first)
     differences, matches = [0.0], []
     for name, solved in theirs.items():
         level = float(np.linalg.norm(solved.samples))
         ours = pilots.get(name, np.zeros((len(solved.samples), made.radio.points), dtype=complex))
         apart = float(np.linalg.norm(ours[:, picks] - solved.samples))
         differences.append(apart / level if level > 0 else (np.inf if apart > 0 else 0.0))
-        matches.append(_matched(made, made.users[name], solved.delays[0], solved.gains[0]))
+        paths = [(one.length, abs(one.gain)) for one in ours_by_user[name]]
+        matches.append(_matched(paths, solved.delays[0], solved.gains[0]))
     return {
         "pilot": round(max(differences), 4),
         "paths": sum(len(one) for one, _ in matches),
@@ -123,13 +127,12 @@ def _compared(made: Scenario, pilots: Mapping[str, np.ndarray], file: Path) -> d
 
 
 def _matched(
-    made: Scenario, user: User, delays: np.ndarray, gains: np.ndarray
+    ours: list[tuple[float, float]], delays: np.ndarray, gains: np.ndarray
 ) -> tuple[list[tuple[float, float]], int]:
     """Pair the paths to the first element; return differences of lengths and levels, and the rest.
 
     Levels are in dB, lengths in m. Sionna finds a path over an edge of two triangles twice.
     """
-    ours = _our_paths(made, user)
     theirs = [
         (float(d) * speed_of_light, abs(complex(g))) for d, g in zip(delays, gains, strict=True)
     ]
@@ -147,45 +150,6 @@ def _matched(
         elif level >= least:
             alone += 1
     return matched, alone + sum(level >= least for _, level in free)
-
-
-def _our_paths(made: Scenario, user: User) -> list[tuple[float, float]]:
-    """Return lengths [m] and levels [-] of our specular paths to the first element."""
-    from simulator.geometry.ray_scene import blocked
-    from simulator.scene.radio_scene import radio_scene
-    from simulator.specular.free_space import direct_wave
-    from simulator.specular.image_method import find_chains
-    from simulator.specular.path_field import specular_response
-
-    scene = radio_scene(made, seed=0, sample=0)
-    if scene.mirrors is None:
-        return []
-    middle = made.radio.frequencies[[made.radio.points // 2]]
-    most = made.max_bounces
-    legs = [leg.sequence[::-1] for leg in scene.mirrors.chains if 0 < leg.bounces <= most]
-    if not legs and most > 0:  # a single bounce of facets alone
-        legs = [(mirror,) for mirror in range(len(scene.mirrors.mirrors))]
-    chains = find_chains(
-        scene.mirrors.mirrors,
-        user.position[None],
-        scene.elements[:1],
-        blocked=partial(blocked, scene.rays),
-        clearance=scene.rays.clearance,
-        max_bounces=most,
-        slabs=scene.slabs,
-        among=legs,
-    )
-    found = []
-    for chain in chains:
-        if chain.crossed is None and not chain.mirrors:
-            level = abs(complex(direct_wave(chain.lengths, middle, waves="spherical")[0, 0]))
-        else:
-            response = specular_response(
-                scene.mirrors.mirrors, [chain], middle, (1, 1), slabs=scene.slabs
-            )
-            level = abs(complex(response[0, 0, 0]))
-        found.append((float(chain.lengths[0]), level))
-    return found
 
 
 def row_json(row: Row) -> dict[str, Any]:
