@@ -64,6 +64,16 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
         If there are no users, or the scenario has two dimensions.
     OutputError
         If the folder exists, or its name has capital letters.
+
+    Examples
+    --------
+    >>> import mmslam
+    >>> small = {"dimensions": 3, "radio.points": 5, "base_station.elements": [2, 2]}
+    >>> small["users.ann.position_m"] = [0.3, 1.0, 0.2]
+    >>> scenario = mmslam.load_scenario("point_scatterers", small)
+    >>> folder = mmslam.to_deepmimo(scenario, "free_space")
+    >>> (folder / "params.json").is_file()
+    True
     """
     folder = Path(folder)
     if scenario.dimensions != 3 or not scenario.users or scenario.max_bounces < 1:
