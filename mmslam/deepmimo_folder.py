@@ -97,7 +97,8 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
     with replacing(folder, _refuse) as new:
         new.mkdir()
         for name, values in matrices.items():
-            np.savez_compressed(new / f"{name}_{_PAIR}.npz", **{name: values.astype(np.float32)})
+            held: dict[str, Any] = {name: values.astype(np.float32)}
+            np.savez_compressed(new / f"{name}_{_PAIR}.npz", **held)
         np.savez_compressed(new / "vertices.npz", vertices=np.zeros((0, 3), dtype=np.float32))
         (new / "objects.json").write_text("[]", encoding="utf-8")
         told = json.dumps(_parameters(scenario, sum(heard)), indent=2)
