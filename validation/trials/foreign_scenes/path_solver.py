@@ -79,12 +79,14 @@ def solved_pilots(
 
 def _tune(scene: Any, frequency: float) -> None:
     """Set a scene's frequency; Sionna refuses materials beyond their band: these get constants."""
+    import mitsuba as mi
+
     for material in scene.radio_materials.values():
         known = material.frequency_update_callback
         if known is None:
             continue
         try:
-            known(frequency)
+            known(mi.Float(frequency))  # in its precision: marble is known up to 60 GHz
         except ValueError:
             at = np.array([frequency])
             permittivity = itu_permittivity(material.itu_type, at, beyond=True)(at)
