@@ -258,8 +258,8 @@ def _faint(
             continue
         if is_hidden(line, others):
             continue
-        if depth_of(line, resolution) < LEAST_DEPTH:
-            continue
+        if depth_of(line, resolution) < max(LEAST_DEPTH, OBLIQUE * _cells(line, resolution)):
+            continue  # along an arc of sidelobes; a wall that nearly faces the array is not faint
         found.append(replace(line, explained=0.0))
     return found
 
