@@ -44,10 +44,16 @@ def json_text(document: Mapping[str, Any] | list[Any]) -> str:
 
 
 def file_name(text: str) -> str:
-    """Return a safe file name: no separator, no invisible character, limited length."""
+    """Return a safe file name of limited length.
+
+    It has no separator, no invisible character, and nothing that a shell obeys, as users paste the
+    paths that commands tell them.
+    """
     name = "".join(
         sign if sign.isprintable() and sign not in _SEPARATORS else "_" for sign in text
     ).strip(" .")
+    if name.startswith("-"):  # an option
+        name = f"_{name[1:]}"
     if len(os.fsencode(name)) > LONGEST_FILE_NAME:
         digest = hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:8]
         name = f"{name[: LONGEST_FILE_NAME // 4 - 9]}-{digest}"  # a sign has 4 bytes at most
@@ -70,7 +76,7 @@ def drawn_plainly(figure: Any) -> None:
         artist.set_text(visible(artist.get_text()))
 
 
-_SEPARATORS = '/\\:*?"<>|'  # on some system or other
+_SEPARATORS = '/\\:*?"<>|' + "$`&;!#'~^%(){}[]"  # of paths on some system or other, and of shells
 
 
 def _number(sign: str) -> str:

@@ -41,6 +41,12 @@ def test_a_name_from_data_stays_in_its_folder(name: str) -> None:
     assert len(made.encode()) <= 100
 
 
+def test_a_file_name_holds_nothing_that_a_shell_obeys() -> None:
+    attack = "-rf $(touch x)`id`&;!'#~{a,b}[c]%PATH%^"
+    assert not set(file_name(attack)) & set("$`&;!'#~^%(){}[]")
+    assert file_name(attack).startswith("_rf ")
+
+
 def test_names_that_are_cut_alike_stay_apart() -> None:
     assert file_name("x" * 300) != file_name("x" * 301)
     assert file_name("../../etc/passwd") == "_.._etc_passwd"

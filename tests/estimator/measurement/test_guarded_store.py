@@ -1,3 +1,4 @@
+import gzip
 import json
 import os
 from pathlib import Path
@@ -47,6 +48,16 @@ def test_a_chunk_that_unpacks_to_more_than_it_may_is_not_unpacked(store: Path) -
     (store / "echo" / "c" / "0" / "0").write_bytes(frame)
     with pytest.raises(MeasurementError, match=rf"unpacks to {2**40} bytes, more than"):
         read_measurement(store)
+
+
+@pytest.mark.parametrize("members", [1, 3])
+def test_what_gzip_unpacks_to_is_counted_not_kept(members: int) -> None:
+    packed = gzip.compress(bytes(2**22)) * members
+    whole = members * 2**22
+    assert guarded_store._unpacks_to_more(packed, whole - 1)
+    assert not guarded_store._unpacks_to_more(packed, whole)
+    assert not guarded_store._unpacks_to_more(packed[:-20], whole)  # cut: its codec says so
+    assert not guarded_store._unpacks_to_more(b"\x1f\x8b" + bytes(99), whole)
 
 
 @pytest.mark.parametrize("length", [0, 100, 300, 70_000, 2**21])
