@@ -64,7 +64,8 @@ def _told(scene: str, ghz: float, bounces: int) -> list[str]:
         made = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
     except subprocess.TimeoutExpired:
         return [scene, str(ghz), f"over {LONGEST:g} s"]
-    lines = made.stdout.splitlines()
+    # Mitsuba tells its warnings on the same way, before the row or after it.
+    lines = [line for line in made.stdout.splitlines() if line.startswith('{"scene"')]
     if made.returncode != 0 or not lines:
         return [scene, str(ghz), "failed", *made.stderr.splitlines()[-1:]]
     row = json.loads(lines[-1])
