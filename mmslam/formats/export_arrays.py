@@ -23,7 +23,7 @@ from estimator.measurement.guarded_store import (
     shortened,
 )
 from estimator.measurement.model import MeasurementError
-from mmslam.output import OutputError, new_file
+from mmslam.output import OutputError, new_file, reserved
 
 SAMPLES_AT_ONCE = 64
 """Samples that are in memory together while NetCDF is written."""
@@ -165,8 +165,13 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
     about = {_identifier(key): value for key, value in _attributes(root.attrs.asdict()).items()}
     content["attributes"] = {**about, "variables": told}
     script = file.with_name(f"{_identifier(f'read_me_{file.stem}')}.m")
-    with _new(script, "MATLAB") as part:
-        part.write_text(_read_me(file, arrays), encoding="utf-8")
+    text = _read_me(file, arrays)
+    if script.is_file() and script.read_bytes() == text.encode():
+        with reserved(script):  # of a command that was killed after it: what it left is removed
+            pass
+    else:
+        with _new(script, "MATLAB") as part:
+            part.write_text(text, encoding="utf-8")
     with _new(file, "MATLAB") as part:
         savemat(part, content, do_compression=True, long_field_names=True, appendmat=False)
     return len(arrays)
