@@ -26,10 +26,11 @@ like a flat one than like one that converges; conjugated, pilots over a rough wa
 all others 3.2 to 21. [-]"""
 DELAYS = 2
 """Strongest delays at which is focused, for time: one decides. [-]"""
+MIDDLE = 1 / 8
+"""Part of the array over which energies are summed: there the length of a wave from aside changes
+by a cell or two. [-]"""
 NEAREST = 0.5
 """Distance below which nothing is focused, over the array's extent. [-]"""
-WIDEST = 0.8
-"""Sine of the widest direction that is tried. [-]"""
 STEPS = 1.2
 """Directions for each cell λ/nD: between two, a peak loses 2.6 dB, alike in both. [-]"""
 FLAT = 1e4
@@ -68,7 +69,9 @@ def brighter_conjugated(data: Echo | Uplink) -> float:
     if len(data.positions) < 3 or extent < wave:
         return 0.0
     ways = 2 if isinstance(data, Echo) else 1
-    sines = np.arange(-WIDEST, WIDEST, wave / (STEPS * ways * extent))
+    # All directions: a user beside the array is focused in his own, or his conjugate is brighter.
+    steps = int(np.ceil(2 * STEPS * ways * extent / wave))
+    sines = np.linspace(-1.0, 1.0, steps + 1)
     same = range_profiles(data)
     other = range_profiles(replace(data, samples=data.samples.conj()))
     longest = same.unambiguous / ways
@@ -80,8 +83,15 @@ def brighter_conjugated(data: Echo | Uplink) -> float:
 
 
 def _strongest(profiles: RangeProfiles, nearest: float) -> Float[np.ndarray, " lengths"]:
-    """Return the path lengths with most energy, not within a length of either end. [m]."""
-    energy = (np.abs(profiles.coefficients[..., 3]) ** 2).sum(axis=0).astype(float)
+    """Return the path lengths with most energy, not within a length of either end. [m].
+
+    They are those of the array's middle: from aside, its ends hear a wave many cells sooner and
+    later, and focused at their length it would be dim.
+    """
+    channels = len(profiles.coefficients)
+    half = max(1, round(0.5 * MIDDLE * channels))
+    middle = profiles.coefficients[channels // 2 - half : channels // 2 + half + 1, :, 3]
+    energy = (np.abs(middle) ** 2).sum(axis=0).astype(float)
     cells = energy.size
     away = np.arange(cells) * profiles.cell
     energy[np.minimum(away, profiles.unambiguous - away) < nearest] = 0.0
