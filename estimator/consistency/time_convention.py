@@ -22,8 +22,8 @@ BRIGHTER = 3.0
 """Intensity of the conjugate's focus over that of the samples, from which they are of the other
 convention. Echoes and pilots of the rooms of :mod:`validation.trials.contradictory_data` and of
 five of the library have 1.0 at most, with half of the positions lost too, as any true wave is more
-like a flat one than like one that converges, and 287 random rooms 1.3; conjugated, pilots over a rough wall near by have 2.1,
-all others 3.2 to 21. [-]"""
+like a flat one than like one that converges, and 287 random rooms 1.3; conjugated, pilots over a
+rough wall near by have 2.1, all others 3.2 to 21. [-]"""
 DELAYS = 2
 """Strongest delays at which is focused, for time: one decides. [-]"""
 MIDDLE = 1 / 8

@@ -29,6 +29,10 @@ validation.experiments.thresholds answers``: with 1.5 and 6 the answers in three
 are the same: six of six walls found, none false, and four false targets. [cells]"""
 MOST = 0.5
 """Share of a line from which most of it is meant. [-]"""
+IN_A_MIRROR = 0.9
+"""Most confidence in a wall that is seen over others only: through a pane it would look the same,
+unless it would hide the pane. In 150 random rooms, four of five without second reflections, two
+walls were seen so, both through glass; in rooms of conductors all were reflections. [-]"""
 NEARER = 0.02
 """Part of a distance by which a wall must be nearer to stand before another: walls that meet are
 known to a cell or two. [-]"""

@@ -166,14 +166,14 @@ def export_matlab(store: Path, file: Path, *, samples: Sequence[int] | None = No
     content["attributes"] = {**about, "variables": told}
     script = file.with_name(f"{_identifier(f'read_me_{file.stem}')}.m")
     text = _read_me(file, arrays)
-    if script.is_file() and script.read_bytes() == text.encode():
-        with reserved(script):  # of a command that was killed after it: what it left is removed
-            pass
-    else:
-        with _new(script, "MATLAB") as part:
-            part.write_text(text, encoding="utf-8")
     with _new(file, "MATLAB") as part:
         savemat(part, content, do_compression=True, long_field_names=True, appendmat=False)
+        if script.is_file() and script.read_bytes() == text.encode():
+            with reserved(script):  # of a command that was killed after it: what it left is removed
+                pass
+        else:
+            with _new(script, "MATLAB") as beside:
+                beside.write_text(text, encoding="utf-8")
     return len(arrays)
 
 
