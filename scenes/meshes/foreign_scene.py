@@ -190,6 +190,7 @@ def _clashes(shapes: tuple[ForeignShape, ...], own: Mapping[str, object]) -> lis
 
 def _body(geometry: Geometry, shape: ForeignShape) -> dict[str, object]:
     body: dict[str, object] = {
+        "flat_faces": geometry.facets == "cut",  # as other path solvers take them
         **_made_of(shape.material, beyond=geometry.beyond_itu),
         **geometry.materials.get(shape.material.name, {}),
         **geometry.objects.get(shape.name, {}),

@@ -139,6 +139,11 @@ class MeshFile(Body):
     facets: Literal["cut", "file"] = Field(
         "cut", description="'cut' the triangles until they are fine enough, or 'file': as they are"
     )
+    flat_faces: bool = Field(
+        False,
+        description="whether its flat faces are walls however many they are, as a town's terrain "
+        "and roofs; otherwise a mesh of more than 1000 stands for something round",
+    )
     hollow: bool = Field(
         False,
         description="whether a closed mesh is a shell that can be seen from within, such as a "

@@ -22,8 +22,10 @@ be a mirror of its own, and every pair of them a chain. A room of 3000 triangles
 Chosen. [-]"""
 
 MOST_ROUND = 2**24
-"""Facets of something round beyond which its flat faces are mirrors after all, as in Sionna RT's
-path solver: terrain and roofs of a town, of which facets would take hours. Chosen. [-]"""
+"""Facets of a mesh with more faces beyond which these are mirrors after all, where the scenario
+says that they are walls (``flat_faces``; of a file of another program always, as its path solver
+takes them): terrain and roofs of a town, of which facets would take hours. A ball is none: its
+faces would be thousands of mirrors. Chosen. [-]"""
 
 
 def flat_and_smooth(body: Body, wavelength: float) -> bool:
@@ -48,6 +50,8 @@ def flat_and_smooth(body: Body, wavelength: float) -> bool:
             wide = np.sqrt(mesh.area / faces) >= LEAST_FACE * wavelength
             if not wide or faces <= MOST_FACES:
                 return bool(wide)
+            if not body.flat_faces:
+                return False
             spacing = facet_spacing(body, wavelength)
             return mesh_facet_count(mesh.area, len(mesh.faces), spacing) > MOST_ROUND
         case _:

@@ -17,10 +17,9 @@ def ball(tmp_path: Path) -> str:
     return str(path)
 
 
-def body(file: str, scale: float) -> MeshFile:
-    return MeshFile.model_validate(
-        {"kind": "mesh", "file": file, "material": "metal", "scale": scale}
-    )
+def body(file: str, scale: float, *, of_walls: bool = True) -> MeshFile:
+    given = {"kind": "mesh", "file": file, "material": "metal", "scale": scale}
+    return MeshFile.model_validate({**given, "flat_faces": of_walls})
 
 
 @pytest.mark.parametrize(
@@ -35,3 +34,7 @@ def test_what_is_round_keeps_its_facets_as_long_as_they_can_be_summed(
     ball: str, radius: float, flat: bool
 ) -> None:
     assert flat_and_smooth(body(ball, radius), WAVELENGTH) is flat
+
+
+def test_a_ball_is_never_thousands_of_mirrors_unless_its_faces_are_called_walls(ball: str) -> None:
+    assert not flat_and_smooth(body(ball, 2.0, of_walls=False), WAVELENGTH)
