@@ -15,7 +15,7 @@ from estimator.imaging.peak_detection import image_contrast
 from estimator.imaging.survey_2d import Survey, survey
 from estimator.mapping.diffuse_multipath import without_scattered_twice
 from estimator.mapping.target_detection import find_targets
-from estimator.mapping.wall_unfolding import IN_A_MIRROR, unfold_seen_lines
+from estimator.mapping.wall_unfolding import confidence_of, unfold_seen_lines
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.fitted_line import FittedLine
@@ -117,7 +117,7 @@ def _mirror(frame: ArrayFrame, line: FittedLine, wall: Wall, through: tuple[int,
         end=frame.to_world(wall.end),
         normal=frame.turned_to_world(normal),
         covariance=wall.covariance,
-        confidence=min(line.confidence, IN_A_MIRROR) if through else line.confidence,
+        confidence=confidence_of(line.confidence, through),
         level_db=float(10 * np.log10(line.level / line.background)),
         seen_through=through,
     )

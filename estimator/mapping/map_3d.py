@@ -17,7 +17,7 @@ from estimator.geometry.specular_chains import Chain, chain_to, unfolded_over
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
 from estimator.geometry.wall_covariance import joint_covariance
 from estimator.imaging.survey_3d import VolumeSurvey, peaks_around, survey_volume
-from estimator.mapping.wall_unfolding import IN_A_MIRROR
+from estimator.mapping.wall_unfolding import confidence_of
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
@@ -306,7 +306,7 @@ def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
                 end=ends[1],
                 normal=frame.turned_to_world(wall.normal),
                 covariance=wall.covariance,
-                confidence=min(plane.confidence, IN_A_MIRROR) if through else plane.confidence,
+                confidence=confidence_of(plane.confidence, through),
                 level_db=float(
                     10 * np.log10(plane.level / max(plane.background, LEAST_BACKGROUND))
                 ),

@@ -54,6 +54,11 @@ class UnfoldedWalls:
     the array: also those that are left out, as another view of a wall."""
 
 
+def confidence_of(fitted: float, seen_through: Chain) -> float:
+    """Return the confidence in a wall as it is reported, from that in its line or plane. [-]."""
+    return min(fitted, IN_A_MIRROR) if seen_through else fitted
+
+
 def unfold_lines(lines: Sequence[FittedLine], resolution: Resolution) -> UnfoldedWalls:
     """Unfold each line over the mirrors that the array sees it through.
 

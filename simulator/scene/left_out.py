@@ -28,7 +28,7 @@ from simulator.scene.radio_scene import opaque, scenario_materials
 from simulator.scene.scene_slabs import scene_slabs
 from simulator.specular.free_space import direct_wave
 from simulator.specular.image_method import find_chains
-from simulator.specular.path_field import specular_response
+from simulator.specular.path_field import chain_response
 from simulator.specular.ray_launching import likely_sequences
 
 MOST_CHAINS = 50_000
@@ -180,20 +180,10 @@ class _Room(NamedTuple):
         )
         middle = np.array([self.scenario.radio.centre_frequency])
         levels = [
-            specular_response(
-                self.mirrors,
-                [chain],
-                middle,
-                (1, 1),
-                transmit=sender.pattern.towards,
-                receive=array.pattern.towards,
-                sent=sender.pattern.polarization,
-                received=array.pattern.polarization,
-                slabs=self.slabs,
-            )
+            chain_response(self.mirrors, chain, middle, sender, array, self.slabs)
             for chain in chains
         ]
-        return max((float(np.abs(level[0, 0, 0])) for level in levels), default=0.0)
+        return max((float(np.abs(level[0])) for level in levels), default=0.0)
 
     def round_an_edge(self, name: str) -> float:
         """Return the amplitude diffracted at the nearest edge, if the line of sight is blocked.

@@ -13,7 +13,7 @@ from simulator.scene.array_antennas import array_group, user_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.scene.scene_mirrors import SceneMirrors
 from simulator.specular.image_method import Chain, find_chains
-from simulator.specular.path_field import specular_response
+from simulator.specular.path_field import chain_response
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,23 +105,13 @@ def _path(
 ) -> UserPath:
     scenario = scene.scenario
     sender, array = user_group(scenario, name), array_group(scenario, end[None])
-    response = specular_response(
-        mirrors,
-        [chain],
-        at,
-        (1, 1),
-        transmit=sender.pattern.towards,
-        receive=array.pattern.towards,
-        sent=sender.pattern.polarization,
-        received=array.pattern.polarization,
-        slabs=scene.slabs,
-    )
+    response = chain_response(mirrors, chain, at, sender, array, scene.slabs)
     crossed = [0] * (len(chain.mirrors) + 1)
     if chain.crossed is not None:
         crossed = chain.crossed[0].tolist()
     return UserPath(
         vertices=np.array([scenario.users[name].position, *chain.vertices[0], end]),
         length=float(chain.lengths[0]),
-        gain=complex(response[0, 0, 0]),
+        gain=complex(response[0]),
         slabs=tuple(len(scene.slabs.crossings(one)) if one else 0 for one in crossed),
     )

@@ -16,6 +16,7 @@ from jaxtyping import Complex, Float, Int
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Waves
+from simulator.antennas.beam_culling import AntennaGroup
 from simulator.antennas.polarization import VERTICAL, Polarization
 from simulator.geometry.mirrors import Mirrors, dot
 from simulator.geometry.slabs import Slabs
@@ -194,6 +195,39 @@ def specular_response(
                 field *= gains[some, None] * wave
                 response[source[some], receiver[some]] += field  # no link occurs twice
     return response
+
+
+def chain_response(
+    mirrors: Mirrors,
+    chain: Chain,
+    frequencies: Float[np.ndarray, " freqs"],
+    sender: AntennaGroup,
+    receiver: AntennaGroup,
+    slabs: Slabs | None,
+) -> Complex[np.ndarray, " freqs"]:
+    """Return the S-parameter of one chain from one antenna to another. [-].
+
+    Parameters
+    ----------
+    mirrors, frequencies, slabs
+        As in :func:`specular_response`.
+    chain
+        Of the link between the first antennas of two groups.
+    sender, receiver
+        Their patterns and polarizations.
+    """
+    response = specular_response(
+        mirrors,
+        [chain],
+        frequencies,
+        (1, 1),
+        transmit=sender.pattern.towards,
+        receive=receiver.pattern.towards,
+        sent=sender.pattern.polarization,
+        received=receiver.pattern.polarization,
+        slabs=slabs,
+    )
+    return np.asarray(response[0, 0])
 
 
 def _by_slabs(

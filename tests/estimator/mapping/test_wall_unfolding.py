@@ -10,7 +10,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.geometry.specular_chains import image_over
 from estimator.geometry.wall_2d import Wall, mirrored
 from estimator.geometry.wall_covariance import place_covariance
-from estimator.mapping.wall_unfolding import unfold_lines, unfold_seen_lines
+from estimator.mapping.wall_unfolding import confidence_of, unfold_lines, unfold_seen_lines
 from estimator.walls.fitted_line import FittedLine
 
 RESOLUTION = Resolution(along_ray=2e-3, across_ray=4e-3)
@@ -168,3 +168,9 @@ def test_what_cannot_be_a_reflection_is_seen_through_a_pane() -> None:
     beside = np.array([[-0.3, 0.05, 0.0], [-0.22, 0.12, 0.0]])
     seen = line(image_over(beside, [wall(pane)], (0,)))
     assert len(unfold_lines([line(pane), seen], RESOLUTION).walls) == 2
+
+
+def test_a_wall_seen_in_mirrors_only_is_never_certain() -> None:
+    assert confidence_of(1.0, ()) == 1.0
+    assert confidence_of(1.0, (0,)) <= 0.9
+    assert confidence_of(0.3, (0, 1)) == 0.3
