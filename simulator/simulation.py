@@ -31,7 +31,12 @@ class Simulation:
 
 
 def simulate(
-    scenario: Scenario, *, seed: int, sample: int = 0, progress: Progress | None = None
+    scenario: Scenario,
+    *,
+    seed: int,
+    sample: int = 0,
+    realisation: int | None = None,
+    progress: Progress | None = None,
 ) -> Simulation:
     """Simulate the measurement of a scenario.
 
@@ -41,6 +46,8 @@ def simulate(
         Radio, base station, objects, users, noise.
     seed, sample
         Which realisation of roughness and noise; each has its own random stream.
+    realisation
+        Sample whose roughness it has, in a frozen room; None: its own.
     progress
         Called with a stage, the steps done and the steps in all.
 
@@ -56,10 +63,10 @@ def simulate(
     advance = _counter("echo", len(elements), progress)
     array: Ports | None = None
     if station.multistatic and scenario.dimensions == 3:
-        apart = multistatic_scene(scenario, seed=seed, sample=sample)
+        apart = multistatic_scene(scenario, seed=seed, sample=sample, realisation=realisation)
         scene, echo = apart.radio, multistatic_echo(apart, advance=advance)
     else:
-        scene = radio_scene(scenario, seed=seed, sample=sample)
+        scene = radio_scene(scenario, seed=seed, sample=sample, realisation=realisation)
         if scene.facets is not None and not station.multistatic and not in_space(scenario):
             check_chains(
                 scene.mutual_visibility.faces,

@@ -93,7 +93,7 @@ class DatasetJob:
     @property
     def space(self) -> SampleSpace:
         """Sample space of the dataset."""
-        return SampleSpace(self.source, self.config)
+        return self.config.space(self.source)
 
 
 def plan_dataset(config: Path | Mapping[str, Any], target: Path) -> DatasetJob:
@@ -113,7 +113,8 @@ def plan_dataset(config: Path | Mapping[str, Any], target: Path) -> DatasetJob:
         If something is missing, unknown or impossible: a line for each problem.
     """
     told = load_variations(config, DatasetConfig)
-    space = open_sample_space(told, config.parent if isinstance(config, Path) else Path.cwd())
+    folder = config.parent if isinstance(config, Path) else Path.cwd()
+    space = told.space(open_sample_space(told, folder).source)
     space.check()
     return DatasetJob(
         source=space.source, config=told, target=target.resolve(), identity=identity(space)

@@ -8,7 +8,9 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from scenes.files.loading import ScenarioSource
 from scenes.files.toml_writer import toml_text
+from scenes.sampling.frozen_rooms import Rooms, RoomSpace
 from scenes.sampling.sample_space import SampleSpace
 from scenes.sampling.variations import Variations
 from scenes.schema.errors import ScenarioError
@@ -27,6 +29,15 @@ class DatasetConfig(Variations):
     most_paths: int = Field(
         8, ge=1, le=1000, description="the largest number of paths that is stored for each user"
     )
+    rooms: Rooms | None = Field(
+        None, description="rooms that hold several samples each [every sample has its own]"
+    )
+
+    def space(self, source: ScenarioSource) -> SampleSpace:
+        """Return the samples of a base scenario."""
+        if self.rooms is None:
+            return SampleSpace(source, self)
+        return RoomSpace(source, self, self.rooms)
 
 
 def identity(space: SampleSpace) -> dict[str, str]:

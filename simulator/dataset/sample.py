@@ -10,6 +10,7 @@ from scipy.constants import speed_of_light
 from estimator.measurement.model import Measurement
 from estimator.measurement.store import PARAMETERS, TRUTH
 from scenes.sampling.drawn_parameters import Parameter
+from scenes.sampling.frozen_rooms import first_sample, room_number
 from scenes.sampling.sample_space import Attempt, SampleSpace, impossible_sample
 from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.objects import Plate
@@ -92,7 +93,12 @@ def _made(
 ) -> Row:
     from simulator.simulation import simulate  # Sionna's import takes seconds
 
-    simulation = simulate(scenario, seed=space.variations.seed, sample=sample)
+    simulation = simulate(
+        scenario,
+        seed=space.variations.seed,
+        sample=sample,
+        realisation=first_sample(space, sample),
+    )
     measurement = simulation.measurement
     if not fits(layout, measurement):
         raise ValueError(
@@ -101,6 +107,7 @@ def _made(
     row = _empty(layout)
     row["status"] = np.array(MADE, dtype="i1")
     row["redraws"] = np.array(redraws, dtype="i4")
+    row["room"] = np.array(room_number(space, sample, attempt.values, scenario), dtype="i8")
     _put_signals(row, layout, measurement)
     _put_geometry(row, scenario, measurement)
     _put_truth(row, layout, scenario, simulation.truth)

@@ -127,6 +127,11 @@ def status_variables() -> list[Variable]:
             type="i4",
             attributes={"units": "1", "long_name": "draws before that were impossible"},
         ),
+        Variable(
+            name="room",
+            type="i8",
+            attributes={"long_name": "equal where samples have the same walls"},
+        ),
     ]
 
 

@@ -56,7 +56,7 @@ class MultistaticScene:
     materials: dict[str, Material]
     shaped: tuple[Surface, ...]  # all objects but plates, with their roughness
     seed: int
-    sample: int
+    sample: int  # of the roughness
 
     @property
     def scenario(self) -> Scenario:
@@ -69,17 +69,22 @@ class MultistaticScene:
         return [*planes, *(surface for surface in self.shaped if surface.name != name)]
 
 
-def multistatic_scene(scenario: Scenario, *, seed: int, sample: int) -> MultistaticScene:
+def multistatic_scene(
+    scenario: Scenario, *, seed: int, sample: int, realisation: int | None = None
+) -> MultistaticScene:
     """Prepare a scenario for simulation, except for the facets of its plates.
+
+    Parameters are those of :func:`simulator.scene.radio_scene.radio_scene`.
 
     Raises
     ------
     ScenarioError
         If a material is not known over the band, or its table cannot be read.
     """
+    frozen = sample if realisation is None else realisation
     materials = scenario_materials(scenario)
     shaped = tuple(
-        object_surface(scenario, name, seed=seed, sample=sample)
+        object_surface(scenario, name, seed=seed, sample=frozen)
         for name, body in scenario.objects.items()
         if not isinstance(body, Plate)
     )
@@ -90,7 +95,7 @@ def multistatic_scene(scenario: Scenario, *, seed: int, sample: int) -> Multista
         elements=true_elements(scenario, seed=seed, sample=sample),
     )
     return MultistaticScene(
-        radio=radio, materials=materials, shaped=shaped, seed=seed, sample=sample
+        radio=radio, materials=materials, shaped=shaped, seed=seed, sample=frozen
     )
 
 

@@ -94,14 +94,26 @@ class RadioScene:
         return MutualVisibility(self.rays, faces, slabs=self.slabs, band=band)
 
 
-def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
+def radio_scene(
+    scenario: Scenario, *, seed: int, sample: int, realisation: int | None = None
+) -> RadioScene:
     """Draw the rough surfaces of a scenario and build its scene.
+
+    Parameters
+    ----------
+    scenario
+        The scenario.
+    seed, sample
+        Which realisation.
+    realisation
+        Sample whose roughness it has; None: its own.
 
     Raises
     ------
     ScenarioError
         If a material is not known over the band, or its table cannot be read.
     """
+    frozen = sample if realisation is None else realisation
     materials = scenario_materials(scenario)  # first: errors show before long work
     elements = true_elements(scenario, seed=seed, sample=sample)
     slabs = scene_slabs(scenario, materials)
@@ -136,7 +148,7 @@ def radio_scene(scenario: Scenario, *, seed: int, sample: int) -> RadioScene:
                 and may_reach(mirrors.mirrors, one, array_group(scenario, elements))
             ]
             reach = needed_reach(scenario, elements, legs, rough)
-        surface = object_surface(scenario, name, seed=seed, sample=sample, reach=reach)
+        surface = object_surface(scenario, name, seed=seed, sample=frozen, reach=reach)
         surfaces.append(surface)
         if len(surface.cells) and not absorbs:
             scattering[name] = (surface, material)
