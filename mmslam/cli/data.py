@@ -87,6 +87,15 @@ def export(
     matlab: Annotated[
         Path | None, typer.Option("--matlab", metavar="FILE.mat", help="MATLAB file to write.")
     ] = None,
+    hugging_face: Annotated[
+        Path | None,
+        typer.Option(
+            "--huggingface", metavar="DIR", help="Folder to write: a card, and parts by room."
+        ),
+    ] = None,
+    license: Annotated[
+        str, typer.Option(metavar="NAME", help="For the card, as the Hugging Face Hub names it.")
+    ] = "unknown",
     sample: Annotated[
         list[int] | None,
         typer.Option(
@@ -95,16 +104,27 @@ def export(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a measurement as Touchstone files, or a dataset's samples as NetCDF or MATLAB.
+    """Write a measurement as Touchstone files, or a dataset as NetCDF, MATLAB or for learning.
 
     Touchstone files come with the mapping that imports them again; what an earlier export wrote
     to DIR is replaced, a foreign folder refused. NetCDF and MATLAB hold all samples by default,
-    with their truth.
+    with their truth. For learning a dataset is divided by room: train, validation and test.
     """
     with told_clearly():
-        if sum(one is not None for one in (touchstone, netcdf, matlab)) != 1:
-            raise typer.BadParameter("give one of --touchstone, --netcdf and --matlab")
-        if touchstone is not None:
+        if sum(one is not None for one in (touchstone, netcdf, matlab, hugging_face)) != 1:
+            raise typer.BadParameter(
+                "give one of --touchstone, --netcdf, --matlab and --huggingface"
+            )
+        if hugging_face is not None:
+            from mmslam.learning import export_hugging_face
+
+            if sample is not None:
+                raise typer.BadParameter("--huggingface divides all samples; leave --sample out")
+            parts = export_hugging_face(measurement, hugging_face, license=license)
+            told: dict[str, Any] = {"folder": str(hugging_face), "parts": parts}
+            named = ", ".join(f"{part} {count}" for part, count in parts.items())
+            line = f"{hugging_face}: {named} samples"
+        elif touchstone is not None:
             from mmslam.measured_data import export_to_touchstone
 
             if sample is not None and len(sample) > 1:
@@ -112,7 +132,7 @@ def export(
             count = export_to_touchstone(
                 measurement, sample=sample[0] if sample else None, folder=touchstone
             )
-            told: dict[str, Any] = {"folder": str(touchstone), "files": count}
+            told = {"folder": str(touchstone), "files": count}
             line = f"{touchstone}: {count} Touchstone files"
         else:
             from mmslam.formats.export_arrays import export_matlab, export_netcdf

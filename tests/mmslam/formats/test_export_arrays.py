@@ -85,7 +85,9 @@ def test_wrong_exports_are_refused(
         assert result.exit_code == 2, result.output
         return " ".join(result.stderr.split())
 
-    assert "give one of --touchstone, --netcdf and --matlab" in refused(store)
+    told = refused(store)
+    assert "give one of --touchstone, --netcdf, --matlab" in told
+    assert "--huggingface" in told
     new = tmp_path / "it.mat"
     assert "sample 5 of 5; it must be 0…4" in refused(store, "--matlab", new, "--sample", 5)
     assert "not a Zarr v3 group" in refused(tmp_path, "--matlab", new)
