@@ -10,13 +10,12 @@ from scipy.constants import speed_of_light
 from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.channel.level_tilt import with_level_tilts
-from estimator.channel.lit_elements import lit_elements, part_of
+from estimator.channel.lit_elements import lit_elements, part_of, shadow_of
 from estimator.channel.path import (
     LEAST_SHARE,
     MOST_PATHS,
     Path,
     PathSet,
-    Shadow,
     no_paths,
 )
 from estimator.geometry.bearing_2d import LINEAR
@@ -103,7 +102,7 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
             free=wave,
             share=wave.explained * share,
             unambiguous=speed_of_light / step,
-            shadow=_shadow(uplink, wave),
+            shadow=shadow_of(uplink, wave.lit),
         )
         for wave in free
     )
@@ -128,16 +127,6 @@ def find_paths(uplink: Uplink, first_map: AngleRangeMap, *, clock_known: bool = 
     return with_level_tilts(uplink, found_paths)
 
 
-def _shadow(uplink: Uplink, wave: SphericalWave) -> Shadow | None:
-    if wave.lit is None:
-        return None
-    return Shadow(
-        lit=wave.lit,
-        reached=uplink.positions[wave.lit].mean(axis=0),
-        dark=uplink.positions[~wave.lit].mean(axis=0),
-    )
-
-
 def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
     """Tell whether two waves are within :data:`UNRESOLVED` cells, in angle and in length."""
     beam = speed_of_light / float(uplink.frequencies.mean()) / float(np.ptp(uplink.positions[:, 0]))
@@ -149,10 +138,11 @@ def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
 
 def _refined(uplink: Uplink, aoa: float, path_length: float) -> WaveStart:
     """Refine a peak of the map on the elements that its wave reaches, from their own centre."""
-    lit = lit_elements(uplink, aoa=aoa, path_length=path_length)
+    peak = path_length * LINEAR.towards(np.array([aoa]))
+    lit = lit_elements(uplink, peak)
     part = part_of(uplink, lit)
     centre = np.zeros(3) if lit is None else part.positions.mean(axis=0)
-    source = path_length * LINEAR.towards(np.array([aoa])) - centre
+    source = peak - centre
     local = replace(part, positions=part.positions - centre)
     near = float(np.linalg.norm(source))
     wave = fit_spherical_wave(local, aoa=float(np.arccos(source[0] / near)), path_length=near)

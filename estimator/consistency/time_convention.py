@@ -6,6 +6,9 @@ samples' conjugate is focused, at the length and with the curvature that belong 
 samples are not. So both are focused at the delays that hold most energy, in all directions, and the
 brightest decides. A flat wave (from far away, or over a mirror that faces the array) is none of
 both: it is tried as well, and where it is brightest nothing is said.
+
+Along a line of elements a wave from (u, w) is bent by :math:`(1 - u^2) / 2R`, whatever its other
+cosine w: so of a planar array its middle row and its middle column are tried, as two lines.
 """
 
 from dataclasses import replace
@@ -14,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
+from estimator.array.planar_array import planar_array, spans_a_plane
 from estimator.imaging.phase_curvature import aligned_profiles
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
 from estimator.measurement.model import Echo, MeasurementError, Uplink
@@ -33,17 +37,19 @@ NEAREST = 0.5
 """Distance below which nothing is focused, over the array's extent. [-]"""
 STEPS = 1.2
 """Directions for each cell λ/nD: between two, a peak loses 2.6 dB, alike in both. [-]"""
+FEWEST = 3
+"""Fewest elements of a line: two tell no curvature. [-]"""
 FLAT = 1e4
 """Least distance of a point whose wave is flat: it bends by 0.08 rad over 1 m at 300 GHz. [m]"""
 
 
 def refuse_other_convention(data: Echo | Uplink, name: str) -> None:
-    """Refuse samples of a linear array that only their conjugate explains.
+    """Refuse samples of a linear or planar array that only their conjugate explains.
 
     Parameters
     ----------
     data
-        In the array's frame: its line along x, boresight along y.
+        In the array's frame: its line along x, or its plane along x and z, boresight along y.
     name
         What it is called.
 
@@ -63,11 +69,42 @@ def refuse_other_convention(data: Echo | Uplink, name: str) -> None:
 
 
 def brighter_conjugated(data: Echo | Uplink) -> float:
-    """Return the brightest focus of the conjugate over that of the samples themselves. [-]."""
+    """Return the brightest focus of the conjugate over that of the samples themselves. [-].
+
+    0 where no line of elements tells it.
+    """
+    both = np.array([_focused(line) for line in _lines(data)]).reshape(-1, 2).sum(axis=0)
+    return float(both[1] / both[0]) if both[0] > 0 else 0.0
+
+
+def _lines(data: Echo | Uplink) -> tuple[Echo | Uplink, ...]:
+    """Return a linear array itself; of a planar one its middle row and its middle column, along x.
+
+    Transmitters that stand apart from a planar array's receivers make no rows: nothing is returned.
+    """
+    if not spans_a_plane(data.positions):
+        return (data,)
+    if isinstance(data, Echo) and data.transmit_positions is not None:
+        return ()
+    lines = []
+    spacing = planar_array(data.positions).spacing
+    for along, across, apart in ((0, 2, spacing[1]), (2, 0, spacing[0])):
+        places = data.positions[:, across]
+        middle = places[np.argmin(np.abs(places))]
+        chosen = np.flatnonzero(np.abs(places - middle) < 0.5 * apart)
+        chosen = chosen[np.argsort(data.positions[chosen, along], kind="stable")]
+        # The other axis is turned away: along a line a wave is bent whatever its cosine there.
+        turned = data.positions[chosen][:, [along, 1, across]] - np.array([0.0, 0.0, middle])
+        lines.append(replace(data, samples=data.samples[chosen], positions=turned))
+    return tuple(lines)
+
+
+def _focused(data: Echo | Uplink) -> tuple[float, float]:
+    """Return the brightest focus of the samples of a line, and of their conjugate. [-]."""
     extent = float(np.ptp(data.positions[:, 0]))
     wave = speed_of_light / float(data.frequencies[-1])
-    if len(data.positions) < 3 or extent < wave:
-        return 0.0
+    if len(data.positions) < FEWEST or extent < wave:
+        return 0.0, 0.0
     ways = 2 if isinstance(data, Echo) else 1
     # All directions: a user beside the array is focused in his own, or his conjugate is brighter.
     steps = int(np.ceil(2 * STEPS * ways * extent / wave))
@@ -79,7 +116,7 @@ def brighter_conjugated(data: Echo | Uplink) -> float:
     flat = _brightest(same, ranges + longest * np.ceil(FLAT / longest), sines)
     here = max(flat, _brightest(same, ranges, sines))
     there = max(flat, _brightest(other, longest - ranges, sines))
-    return there / here if here > 0 else 0.0
+    return here, there
 
 
 def _strongest(profiles: RangeProfiles, nearest: float) -> Float[np.ndarray, " lengths"]:

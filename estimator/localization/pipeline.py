@@ -136,7 +136,7 @@ def locate(
     notes += [note for one in heard_by for note in one.notes]
     uplinks = tuple(one.data for one in heard_by)
     frame = stages.frame(measurement)
-    if isinstance(stages, LinearStages):
+    if isinstance(stages, LinearStages | PlanarStages):
         if echo is not None:
             refuse_other_convention(local_echo(echo, frame), "echo")
         for uplink in uplinks:

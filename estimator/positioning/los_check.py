@@ -18,6 +18,7 @@ from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.geometry.specular_chains import Chain
 from estimator.geometry.wall_2d import Wall
+from estimator.geometry.wall_3d import within
 from estimator.positioning.blockage import (
     LEAST_IMAGE_CONTRAST,
     LOOSE_PEAKS,
@@ -162,9 +163,6 @@ def look_along_legs(
 ) -> StraightWay:
     """Look for mirrors that cross a path beyond its first mirror, and that the map does not show.
 
-    In the plane only: in space, two unassigned peaks lie near some segment of the path by chance
-    too often to indicate a mirror; this rate has not been measured yet.
-
     Parameters
     ----------
     answer
@@ -177,10 +175,10 @@ def look_along_legs(
         As in :func:`look_along`.
     """
     points = room.unassigned_peaks[:LOOSE_PEAKS]
-    if len(how.coordinates) == 3 or answer.path is None:
+    if answer.path is None:
         return StraightWay(sight="clear", doubt=None)
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
-        wall = wall_between(points[first], points[second], room.resolution, how)
+        wall: FlatWall | None = wall_between(points[first], points[second], room.resolution, how)
         if wall is None or np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:
             continue
         if _crosses(wall, answer.path):
@@ -192,7 +190,7 @@ def look_along_legs(
     for point in points:
         if _beside_a_wall(point, room):
             continue
-        wall = wall_behind(point, room.resolution)
+        wall = wall_behind(point, room.resolution, how)
         if _crosses(wall, answer.path):
             return StraightWay(
                 sight="behind a point",
@@ -204,12 +202,17 @@ def look_along_legs(
 
 def _beside_a_wall(point: Float[np.ndarray, " 3"], room: MapContext) -> bool:
     """Tell whether a point is so near to a known wall that it may be a sidelobe of the wall's."""
+    reach = CLOUD * room.resolution.along_ray
     for wall in room.walls:
-        assert isinstance(wall, Wall)
-        along = wall.end - wall.start
-        share = np.clip((point - wall.start) @ along / (along @ along), 0.0, 1.0)
-        apart = float(np.linalg.norm(point - wall.start - share * along))
-        if apart < CLOUD * room.resolution.along_ray:
+        if isinstance(wall, Wall):
+            along = wall.end - wall.start
+            share = np.clip((point - wall.start) @ along / (along @ along), 0.0, 1.0)
+            if float(np.linalg.norm(point - wall.start - share * along)) < reach:
+                return True
+            continue
+        height = float((point - wall.centre) @ wall.normal)
+        foot = point - height * wall.normal
+        if abs(height) < reach and within(foot[None], wall, margin=reach)[0]:
             return True
     return False
 

@@ -85,7 +85,7 @@ def wall_between(
     )
 
 
-def wall_behind(point: Float[np.ndarray, " 3"], resolution: Resolution) -> Wall:
+def wall_behind(point: Float[np.ndarray, " 3"], resolution: Resolution, how: Bearing) -> FlatWall:
     """Return the upright wall that runs away from the array behind its near end.
 
     Parameters
@@ -94,10 +94,32 @@ def wall_behind(point: Float[np.ndarray, " 3"], resolution: Resolution) -> Wall:
         Where the image shows the near end. [m]
     resolution
         Of the image.
+    how
+        What the array measures of a direction. In space the near end tells that its edge is at a
+        right angle to the ray, and not how it is turned about that: it is taken to be as upright as
+        that allows, with the deviation :data:`EDGE_ON_TILT`.
     """
-    end = point * (1 + EDGE_ON_LENGTH / float(np.linalg.norm(point)))
-    offset = PEAK_DEVIATION * float(resolution.cell(point, unit_normal(point, end)))
+    far = float(np.linalg.norm(point))
+    end = point * (1 + EDGE_ON_LENGTH / far)
     # It turns about its near end; its middle moves against the normal then, as in wall_between.
     turn = np.array([1.0, -0.5 * EDGE_ON_LENGTH]) * EDGE_ON_TILT
-    covariance = np.outer(turn, turn) + np.diag([0.0, offset**2])
-    return Wall(start=point, end=end, covariance=covariance)
+    if isinstance(how, LinearBearing):
+        offset = PEAK_DEVIATION * float(resolution.cell(point, unit_normal(point, end)))
+        return Wall(
+            start=point, end=end, covariance=np.outer(turn, turn) + np.diag([0.0, offset**2])
+        )
+    ahead = point / far
+    up = np.array([0.0, 0.0, 1.0]) - ahead[2] * ahead
+    axes = np.stack([ahead, up / np.linalg.norm(up)])
+    offset = PEAK_DEVIATION * float(resolution.cell(point, np.cross(axes[0], axes[1])))
+    covariance = np.zeros((3, 3))
+    # It rises along its first axis, about its near end: its middle moves with the normal.
+    covariance[np.ix_([0, 2], [0, 2])] = np.outer(turn, turn) * [[1, -1], [-1, 1]]
+    covariance += np.diag([0.0, EDGE_ON_TILT**2, offset**2])
+    reach = EDGE_REACH * EDGE_ON_LENGTH * axes[1]
+    return PlaneWall(
+        corners=np.stack([point - reach, end - reach, end + reach, point + reach]),
+        centre=0.5 * (point + end),
+        axes=axes,
+        covariance=covariance,
+    )

@@ -16,7 +16,7 @@ any curvature :math:`\kappa` of the wavefront at the array's centre, zero includ
   :math:`\ell_m = d - n \cdot q_m`, and the fit is that of the plane itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -38,6 +38,9 @@ NARROWEST_BAND = 1e-3
 CURVATURES = (-0.5, 0.9)
 """Curvatures, times half the aperture's diagonal, between which a fit stays: at 1 the source would
 be at the array's corner. [-]"""
+
+SLOPE_STEP = 1e-6
+"""Of central differences: as far from rounding as from the curvature. [-], [m], [1/m]"""
 
 TILES = 5
 """Tiles of the array along each axis; residuals of different tiles count as independent."""
@@ -74,6 +77,46 @@ class Wavefront:
 def towards(along: float, up: float) -> Float[np.ndarray, " 3"]:
     """Return the unit vector with given direction cosines along x and z, in front (y ≥ 0)."""
     return np.array([along, np.sqrt(max(1 - along**2 - up**2, 0.0)), up])
+
+
+def about_another_centre(wave: Wavefront, centre: Float[np.ndarray, " 3"]) -> Wavefront:
+    """Describe a wave at another point: its direction, length and curvature there.
+
+    Parameters
+    ----------
+    wave
+        At the origin.
+    centre
+        Where it is described. [m]
+
+    Returns
+    -------
+    The same field; positions are then those over that point.
+    """
+    free = len(wave.covariance) == 4
+    values = np.array([*wave.cosines, wave.path_length, wave.curvature])[: len(wave.covariance)]
+
+    def moved(values: Float[np.ndarray, " parameters"]) -> Float[np.ndarray, " parameters"]:
+        bend = float(values[3]) if free else 1 / float(values[2])
+        ray = towards(float(values[0]), float(values[1])) - bend * centre
+        root = float(np.linalg.norm(ray))
+        here = centre[None, :]
+        length = _lengths(here, float(values[0]), float(values[1]), float(values[2]), bend)[0][0]
+        return np.array([ray[0] / root, ray[2] / root, length, bend / root])[: values.size]
+
+    there = moved(values)
+    units = np.eye(values.size) * SLOPE_STEP
+    slopes = np.stack([moved(values + unit) - moved(values - unit) for unit in units], axis=-1)
+    slopes /= 2 * SLOPE_STEP
+    return replace(
+        wave,
+        cosines=(float(there[0]), float(there[1])),
+        path_length=float(there[2]),
+        curvature=float(there[3]) if free else 1 / float(there[2]),
+        # The field is taken at zero path length, over which it grows.
+        gain=wave.gain * wave.path_length / float(there[2]),
+        covariance=slopes @ wave.covariance @ slopes.T,
+    )
 
 
 def wavefront_field(

@@ -43,6 +43,30 @@ def test_an_echo_is_focused_as_it_is_and_its_conjugate_is_refused(
         refuse_other_convention(conjugated(echo), "echo")
 
 
+def test_a_planar_array_is_told_by_its_middle_row_and_column(world: Any) -> None:
+    line = 0.5e-3 * (np.arange(96) - 47.5)
+    x, z = np.meshgrid(line, line, indexing="ij")
+    positions = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=-1)
+    band = world.band[::2]
+    # From aside and above: neither line looks at it.
+    place = np.array([0.03, 0.08, 0.02])
+    echo = world.echo(place[None], np.random.default_rng(1), positions=positions, frequencies=band)
+    waves = np.exp(
+        -2j * np.pi / speed_of_light * np.linalg.norm(place - positions, axis=-1)[:, None] * band
+    )
+    user = Uplink(samples=waves, positions=positions, frequencies=band, user="ann")
+    for data in (echo, user):
+        assert brighter_conjugated(data) <= 1
+        assert brighter_conjugated(conjugated(data)) > BRIGHTER
+    other = conjugated(user)
+    with pytest.raises(MeasurementError, match="uplink of 'ann': all waves converge"):
+        locate(Measurement(echo=None, uplinks=(other,), clock_offset=0.0))
+    # A row in the array's plane, elsewhere than its middle, is bent alike; order does not count.
+    mixed = np.random.default_rng(3).permutation(len(positions))
+    again = replace(user, samples=waves[mixed], positions=positions[mixed])
+    assert brighter_conjugated(again) == pytest.approx(brighter_conjugated(user))
+
+
 def test_the_ratio_of_the_conjugate_is_the_inverse_of_its_own(world: Any) -> None:
     echo = world.echo(PLACES["points"], np.random.default_rng(2))
     again = brighter_conjugated(conjugated(echo))

@@ -11,7 +11,7 @@ from scipy.constants import speed_of_light
 from scipy.linalg import block_diag
 
 from estimator.array.resolution_cell import Resolution
-from estimator.channel.path import Path, PathSet
+from estimator.channel.path import Path, PathSet, Shadow
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.bearing_2d import LINEAR
 from estimator.geometry.bearing_3d import PLANAR
@@ -291,6 +291,23 @@ def test_at_a_walls_very_end_the_ray_may_pass_beside_it(
     assert other.bounces == 1 - bounces
     assert found.position is not None
     at(other, image_of(found.position), 1e-6)
+
+
+@pytest.mark.parametrize(("side", "bounces"), [(-1.0, 1), (1.0, 0)])
+def test_the_elements_that_a_wave_reaches_tell_whether_it_came_over_a_walls_end(
+    dim: Dimension, side: float, bounces: int
+) -> None:
+    # As above at the very end; elements 3 cm aside see it 14 mm farther in on the wall, or beyond.
+    near = END - 2e-3 * ALONG
+    wave = direct(dim, 1.8 * near / np.linalg.norm(near))
+    shadow = Shadow(
+        lit=np.arange(128) < 64,
+        reached=np.array([0.03 * side, 0.0, 0.0]),
+        dark=np.array([-0.03 * side, 0.0, 0.0]),
+    )
+    assert decided(dim, [wave], room(slanted(dim))).status == "ambiguous"
+    found = decided(dim, [replace(wave, shadow=shadow)], room(slanted(dim)))
+    assert (found.status, found.bounces) == ("found", bounces)
 
 
 def test_well_inside_or_well_beside_a_wall_nothing_is_ambiguous(dim: Dimension) -> None:
