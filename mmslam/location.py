@@ -145,6 +145,8 @@ def write_results(
 ) -> Mapping[str, Any]:
     """Draw the figures, and write them with the result and the report; the scenario is its TOML."""
     # matplotlib's import takes half a second that other commands need not wait.
+    from mmslam.results.page.plan import plan_document
+    from mmslam.results.page.single_file import can_draw
     from mmslam.results.pictures_2d import write_pictures
     from mmslam.results.report import render_report
 
@@ -153,7 +155,10 @@ def write_results(
     pictures = write_pictures(new, measurement, estimate, truth)
     timings = {**timings, "figures": time.perf_counter() - started}
     result = result_document(measurement, estimate, truth, timings=timings)
-    report = render_report(result, measurement, pictures, scenario=scenario)
+    plan = None
+    if can_draw():
+        plan = plan_document(measurement, estimate, truth, dimensions=result["dimensions"])
+    report = render_report(result, measurement, pictures, scenario=scenario, plan=plan)
     (new / own_results.REPORT).write_text(report, encoding="utf-8")
     (new / own_results.RESULT).write_text(to_json(result), encoding="utf-8")
     return result

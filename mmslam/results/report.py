@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Measurement
-from mmslam.plain_text import visible
+from mmslam.results.page.single_file import closed_policy, inlined, template_environment
 
 CAPTIONS = {
     "localization.png": "Plan of what was found; the user enlarged, with its error ellipses.",
@@ -19,6 +18,12 @@ CAPTIONS = {
     "corrected_image.png": "The image after each ghost was unfolded through its mirror.",
     "angle_range_map.png": "The user's pilot over angle of arrival and path length.",
 }
+
+DRAWN_ALIVE = ("localization.png", "raw_image.png", "corrected_image.png")
+"""Pictures of what the page draws itself, where it can."""
+
+SCRIPTS_2D = ("predicted_paths.js", "moved_user.js", "plan.js", "start_report.js")
+SCRIPTS_3D = (*SCRIPTS_2D[:-1], "slices.js", "space.js", SCRIPTS_2D[-1])
 
 WIDE = ("localization.png", "angle_range_map.png")  # these hold two panels
 
@@ -29,6 +34,7 @@ def render_report(
     pictures: Mapping[str, Path],
     *,
     scenario: str | None = None,
+    plan: Mapping[str, Any] | None = None,
 ) -> str:
     """Write the page that tells one result.
 
@@ -42,19 +48,17 @@ def render_report(
         PNG files by name; they are embedded.
     scenario
         What was simulated, if anything; its TOML text is included.
+    plan
+        What :func:`mmslam.results.page.plan_document` lays out: drawn to look into, in place of
+        the still pictures of the same. None: the page runs no script.
 
     Returns
     -------
     HTML that needs no other file and no network.
     """
-    environment = Environment(
-        loader=PackageLoader("mmslam"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_shown,
-    )
+    environment = template_environment()
+    scripts = SCRIPTS_3D if result["dimensions"] == 3 else SCRIPTS_2D
+    alive = None if plan is None else inlined(plan, scripts)
     environment.filters["fixed"] = _fixed
     environment.filters["point"] = _point
     environment.filters["deviation"] = _deviation
@@ -68,10 +72,13 @@ def render_report(
                 "wide": name in WIDE,
             }
             for name, caption in CAPTIONS.items()
-            if name in pictures
+            if name in pictures and not (alive and name in DRAWN_ALIVE)
         ],
         scenario=scenario,
         pi=math.pi,
+        page=plan,
+        inlined=alive,
+        policy=closed_policy() if alive is None else alive.policy,
     )
 
 
@@ -98,11 +105,6 @@ def radio_parameters(measurement: Measurement) -> dict[str, str]:
         described["range resolution c/2B"] = f"{1e3 * speed_of_light / (2 * bandwidth):.2f} mm"
         described["unambiguous one-way path"] = f"{speed_of_light / step:.2f} m"
     return described
-
-
-def _shown(value: object) -> object:
-    """Show control characters and marks of direction of a name, rather than obey them."""
-    return visible(value) if type(value) is str else value  # markup is our own template's
 
 
 def _fixed(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
