@@ -5,15 +5,17 @@ samples and holes as well.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import brentq
 from scipy.special import i0
 
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)  # ample for 20 cycles
+
+_NEWTON_STEPS = 6  # four converge to the last digit
 
 _SPANNED = 1e-9  # extent above which an array spans an axis [m]
 
@@ -63,13 +65,7 @@ class Window:
     @property
     def half_power_width(self) -> float:
         """Width of the window's spectrum between its -3 dB points: 0.886 if rectangular."""
-        peak = float(np.abs(self._spectrum(np.zeros(1))[0]))
-        half = brentq(
-            lambda place: float(np.abs(self._spectrum(np.array([place]))[0])) / peak - np.sqrt(0.5),
-            1e-6,
-            3.0,
-        )
-        return 2 * float(half)
+        return _half_power_width(self)
 
     @property
     def peak_sidelobe_db(self) -> float:
@@ -87,6 +83,24 @@ class Window:
 
 
 RECTANGULAR = Window()
+
+
+@cache
+def _half_power_width(window: Window) -> float:
+    """Solve for the width by Newton's method.
+
+    It begins on the parabola of the main lobe's top, which is narrower than the lobe and ends where
+    that is still steep: from 4 % off, it converges in four steps.
+    """
+    x = (_NODES + 1) / 4  # over half the window, because it is even
+    weights = _WEIGHTS * window(x)
+    weights /= weights.sum()
+    level = np.sqrt(0.5)
+    place = np.sqrt(2 * (1 - level) / (weights @ (2 * np.pi * x) ** 2))
+    for _ in range(_NEWTON_STEPS):
+        turn = 2 * np.pi * x * place
+        place += (weights @ np.cos(turn) - level) / (weights @ (2 * np.pi * x * np.sin(turn)))
+    return float(2 * place)
 
 
 def frequency_taper(

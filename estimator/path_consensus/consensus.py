@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
-from scipy.optimize import linprog
-from scipy.stats import chi2
 
+from estimator.compute.distributions import chi_square_quantile, chi_square_tail
 from estimator.measurement.errors import MeasurementError
 from estimator.measurement.path_list import PathList
 from estimator.path_consensus.flat_mirrors import chains_of
@@ -131,7 +130,7 @@ def _doubt(paths: ListedPaths, rooms: Sequence[Room]) -> str | None:
             f"mirrors and users explain {told:.0%} of the paths only, less than {LEAST_TOLD:.0%}: "
             "direct paths may be hidden, or the deviations of angles and delays larger than told"
         )
-    if room.fit.freedom > 0 and chi2.sf(room.fit.chi_square, room.fit.freedom) < LEAST_FIT:
+    if room.fit.freedom > 0 and chi_square_tail(room.fit.chi_square, room.fit.freedom) < LEAST_FIT:
         ratio = np.sqrt(room.fit.chi_square / room.fit.freedom)
         return (
             f"what is left over is {ratio:.2f} times what the deviations of angles and delays "
@@ -167,6 +166,8 @@ def _mirrored_odds(paths: ListedPaths, room: Room) -> float:
 
 def _from_one_side(paths: ListedPaths, room: Room) -> bool:
     """Tell whether all explained paths may come from the front of one wall: from half of space."""
+    from scipy.optimize import linprog  # takes long to import
+
     rays = paths.direction[room.chain >= 0]
     # The largest t with n·s ≥ t for all of them, n in a box.
     cost = np.append(np.zeros(paths.axes), -1.0)
@@ -205,7 +206,7 @@ def _user(
     apart = users - position
     spread = around + fit.user_covariance[place]
     square = np.einsum("ci,ci->c", apart, np.linalg.solve(spread, apart[..., None])[..., 0])
-    here = square < chi2.ppf(SAME, paths.axes)
+    here = square < chi_square_quantile(SAME, paths.axes)
     best = float(gains[here].max(initial=0.0))
     rivals = _distinct(users[~here], around[~here], gains[~here])
     likely = np.array([np.exp(min(gain - best, 700.0)) for _, _, gain in rivals])
@@ -263,7 +264,7 @@ def _distinct(
     """Take the likeliest of each group of candidates at one place."""
     kept: list[tuple[np.ndarray, np.ndarray, float]] = []
     for user, spread, gain in zip(users, around, gains, strict=True):
-        limit = chi2.ppf(SAME, user.size)
+        limit = chi_square_quantile(SAME, user.size)
         if not any(
             (user - other) @ np.linalg.solve(spread + near, user - other) < limit
             for other, near, _ in kept

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import linear_sum_assignment
 
 from estimator.path_consensus.flat_mirrors import Mirrors, chains_of
 from estimator.path_consensus.listed_paths import ListedPaths, log_normal
@@ -75,6 +74,8 @@ def log_priors(count: int) -> Float[np.ndarray, " chains"]:
 
 def paired(likely: Float[np.ndarray, "rows chains"]) -> tuple[np.ndarray, np.ndarray]:
     """Pair paths with chains, each at most once; return the chains (−1: none) and the gains."""
+    from scipy.optimize import linear_sum_assignment  # takes long to import
+
     useful = np.maximum(likely, 0.0)
     chain = np.full(len(likely), -1)
     gain = np.zeros(len(likely))

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import null_space
-from scipy.optimize import least_squares
 
 from estimator.path_consensus.flat_mirrors import Mirrors, chains_of
 from estimator.path_consensus.listed_paths import ListedPaths
@@ -166,6 +165,8 @@ def fitted(
         if not clock_known:
             made[:, 0, -1] = -1 / paths.length_deviation
         return np.concatenate([made[:, 0], made[:, 1:].reshape(-1, values.size)])
+
+    from scipy.optimize import least_squares  # takes long to import
 
     solved = least_squares(
         left, start, jac=slopes, method="trf", x_scale="jac", max_nfev=MOST_STEPS

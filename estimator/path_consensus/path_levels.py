@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
-from scipy.stats import norm
 
+from estimator.compute.distributions import normal_density
 from estimator.measurement.path_list import PathList
 from estimator.positioning.level_likelihood import LEAST_DB, SMOOTH_METAL
 from estimator.prediction.wall_reflection import ASSUMED_DB, ASSUMED_DEVIATION_DB
@@ -57,7 +57,7 @@ def level_gains(
     for order in range(ORDERS):
         metal = SMOOTH_METAL**order
         spread = np.hypot(deviation, np.sqrt(order) * ASSUMED_DEVIATION_DB)
-        density = (1 - metal) * norm.pdf(excess, order * ASSUMED_DB, spread)
-        density = density + metal * norm.pdf(excess, 0.0, deviation)
+        density = (1 - metal) * normal_density(excess, order * ASSUMED_DB, spread)
+        density = density + metal * normal_density(excess, 0.0, deviation)
         gains[:, order] = np.log(np.maximum(density, 1e-30))
     return np.asarray(gains + np.log(ABOVE_DB - LEAST_DB))

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
-from scipy.stats import chi2
 
 from estimator import false_alarm
+from estimator.compute.distributions import chi_square_quantile
 from estimator.geometry.bearing_2d import LINEAR
 from estimator.geometry.path_tracing import trace
 from estimator.geometry.wall_2d import Wall, mirrored
@@ -45,7 +45,7 @@ LEAST_DOUBT = 1e-9
 SAME_BOUNCE = 1e-3
 """Distance within which two paths are reflected at one place: both follow the same wave. [m]"""
 
-SAME = float(chi2.ppf(1 - false_alarm.DISAGREEMENT, df=2))
+SAME = chi_square_quantile(1 - false_alarm.DISAGREEMENT, 2)
 """Squared distance, over its covariance, within which two positions are the same. [-]."""
 
 

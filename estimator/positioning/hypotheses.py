@@ -8,10 +8,10 @@ leave no more over than their covariances allow are consistent.
 from itertools import product
 
 import numpy as np
-from scipy.stats import chi2
 
 from estimator import false_alarm
 from estimator.channel.path import Path, PathSet
+from estimator.compute.distributions import chi_square_quantile
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.specular_chains import Chain
 from estimator.positioning.map_context import MapContext
@@ -77,4 +77,4 @@ def same_place(one: Consensus, other: Consensus, how: Bearing) -> bool:
 
 def same_square(how: Bearing) -> float:
     """Squared distance, over its covariance, within which two positions are the same. [-]."""
-    return float(chi2.ppf(SAME, df=len(how.coordinates)))
+    return chi_square_quantile(SAME, len(how.coordinates))

@@ -23,9 +23,10 @@ ones were within 0.3 dB of it.
 from math import exp, hypot, pi, sqrt
 from typing import Literal
 
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from estimator.channel.path import Path
+from estimator.compute.distributions import normal_density
 from estimator.prediction.wall_reflection import ASSUMED_DB, ASSUMED_DEVIATION_DB, excess_db
 
 Way = Literal["direct", "reflected", "through"]
@@ -181,12 +182,12 @@ def _tilt_density(tilt: float, frequency: float, bandwidth: float, way: Way) -> 
         mean = REFLECTED_TILT * wide if way == "reflected" else 0.0
         spread = REFLECTED_TILT_DEVIATION * wide if way == "reflected" else 0.0
         return sum(
-            chance * float(norm.pdf(tilt, mean, hypot(spread, error)))
+            chance * float(normal_density(tilt, mean, hypot(spread, error)))
             for chance, error in TILT_ERRORS
         )
     least = THROUGH_TILT * THROUGH_DB_PER_GHZ * frequency / 1e9 * share
     most = MOST_THROUGH_TILT * share
     return sum(
-        chance * float(norm.cdf((-least - tilt) / error) - norm.cdf((-most - tilt) / error))
+        chance * float(ndtr((-least - tilt) / error) - ndtr((-most - tilt) / error))
         for chance, error in TILT_ERRORS
     ) / (most - least)

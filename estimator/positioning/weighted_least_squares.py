@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
-from scipy.stats import chi2
 
 from estimator import false_alarm
+from estimator.compute.distributions import chi_square_quantile
 from estimator.geometry.bearing import Bearing
 from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import slopes_by_wall
@@ -74,7 +74,7 @@ class Consensus:
     @property
     def agrees(self) -> bool:
         """Whether all paths can be of one user at this position."""
-        return self.freedom == 0 or self.chi_square < float(chi2.ppf(AGREE, self.freedom))
+        return self.freedom == 0 or self.chi_square < chi_square_quantile(AGREE, self.freedom)
 
 
 def solve_position(

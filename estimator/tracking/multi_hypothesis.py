@@ -18,9 +18,9 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
 
 from estimator import false_alarm
+from estimator.compute.distributions import chi_square_quantile
 from estimator.results.estimate import UserEstimate
 from estimator.tracking.constant_velocity import State, acceleration_noise, moved, smoothed, updated
 
@@ -147,7 +147,7 @@ def track(
     seen = [_seen(one, axes, steady) for one in fixes]
     size = len(axes)
     rules = _Rules(
-        gate=float(chi2.ppf(gate, df=max(size, 1))),
+        gate=chi_square_quantile(gate, max(size, 1)),
         missed=float(np.log(outlier_share) - size * np.log(region)),
         believed=float(np.log1p(-outlier_share)),
         start=float(-size * np.log(region)),

@@ -19,10 +19,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import norm
 
 from estimator import false_alarm
 from estimator.array.resolution_cell import Resolution
+from estimator.compute.distributions import normal_limit
 from estimator.imaging.peak_detection import DYNAMIC_RANGE, peaks_above
 from estimator.imaging.survey_2d import Survey
 from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
@@ -84,7 +84,7 @@ def find_faint_lines(
     first, second, cells = first[long], second[long], cells[long]
     if not first.size:
         return ()
-    least = float(norm.isf(false_alarm.WALL / first.size))
+    least = normal_limit(false_alarm.WALL / first.size)
     significance = _significance(
         looked, over, free, peaks[first], peaks[second], cells, least, resolution
     )

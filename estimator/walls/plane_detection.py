@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
-from scipy.stats import poisson
 
 from estimator import false_alarm
 from estimator.array.resolution_cell import Resolution
+from estimator.compute.distributions import poisson_tail
 
 DRAWS = 6000
 """Planes drawn in each round: one that a tenth of the peaks lie on is drawn six times. [-]"""
@@ -124,7 +124,7 @@ def _best_plane(
     extent = radial * volume[0] + np.sqrt(1 - radial**2) * volume[1] * reach
     slab = 2 * TOLERANCE * float(resolution.cell(centre, normal))
     expected = CLUMPED * len(peaks) * slab / extent
-    chance = float(poisson.sf(counts[best] - 4, expected)) * DRAWS
+    chance = poisson_tail(counts[best] - 4, expected) * DRAWS
     if counts[best] < FEWEST_INLIERS or chance > false_alarm.PLANE:
         return None
     members = near[best]

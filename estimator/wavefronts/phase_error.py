@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.fft import dct
-from scipy.stats import chi2, f
 
 from estimator import false_alarm
+from estimator.compute.distributions import chi_square_quantile, f_quantile
 
 TILTS = (3, 8)
 """Modes over the aperture, in half periods, that tell the level of a tilt. Lower ones belong to
@@ -96,7 +96,9 @@ def _excess(modes: Float[np.ndarray, " elements"], first: int, last: int, white:
     """
     first = min(first, modes.size - 1)
     few = modes[first : last + 1]
-    if few.mean() > white * chi2.ppf(1 - false_alarm.EXCESS, 2 * few.size) / (2 * few.size):
+    if few.mean() > white * chi_square_quantile(1 - false_alarm.EXCESS, 2 * few.size) / (
+        2 * few.size
+    ):
         return _widening((first, last)) * (float(few.mean()) - white)
     return max(float(modes[first : MANY + 1].mean()) - white, 0.0)
 
@@ -108,4 +110,4 @@ def _widening(modes: tuple[int, int]) -> float:
     each mode, not χ².
     """
     freedom = 2 * (modes[1] - modes[0] + 1)
-    return float(2 * f.ppf(COVERED, 2, freedom) / chi2.ppf(COVERED, 2))
+    return 2 * f_quantile(COVERED, 2, freedom) / chi_square_quantile(COVERED, 2)

@@ -1,7 +1,7 @@
 """Commands about one room: its scenario, its measurement, its estimate."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,6 +23,9 @@ from mmslam.cli.options import (
 from mmslam.cli.printing import print_json, print_outcome, print_written
 from mmslam.plain_text import visible
 from mmslam.terminal.exit_codes import stdout_kept_clean, told_clearly
+
+if TYPE_CHECKING:  # scenarios' models take long to import
+    from scenes.scenario import Scenario
 
 
 def scenes(
@@ -153,7 +156,7 @@ def simulate(
         print_written(output, measurement, as_json, notes)
 
 
-def _tell_ranges(scenario: mmslam.Scenario) -> None:
+def _tell_ranges(scenario: "Scenario") -> None:
     """Print notes on a frequency grid too coarse for the scene, before any long work."""
     from simulator.scene.unambiguous_range import range_notes
 

@@ -6,10 +6,10 @@ closed, so that its normals point away from what is solid. A part inside another
 part inside a cavity solid again.
 """
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from scenes.meshes.triangle_mesh import TriangleMesh
 
@@ -31,6 +31,9 @@ def oriented(mesh: TriangleMesh) -> TriangleMesh:
     The same triangles in the same order. A part that cannot be wound one way (a Möbius strip)
     keeps its winding; an open one is wound alike, towards either side.
     """
+    from scipy.sparse import coo_array  # takes long to import
+    from scipy.sparse.csgraph import connected_components
+
     pairs, count = mesh.neighbours, len(mesh.faces)
     links = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(count, count)).tocsr()
     parts, part = connected_components(links, directed=False)
@@ -55,12 +58,14 @@ def oriented(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _wound_alike(
-    links: csr_array,
+    links: Any,  # csr_array
     part: Int[np.ndarray, " faces"],
     pairs: Int[np.ndarray, "pairs 2"],
     against: Bool[np.ndarray, " pairs"],
 ) -> Bool[np.ndarray, " faces"]:
     """Tell which triangles to reverse, so that each part is wound like its first triangle."""
+    from scipy.sparse.csgraph import breadth_first_order
+
     turned = np.zeros(len(part), dtype=bool)
     disagree = {tuple(pair) for pair in np.sort(pairs[against], axis=1).tolist()}
     affected = np.unique(part[pairs[against, 0]])

@@ -8,8 +8,6 @@ their mean.
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from scenes.meshes.mesh_file import placed_mesh
 from scenes.meshes.triangle_mesh import TriangleMesh
@@ -125,6 +123,9 @@ def _cut(
 
 def flat_patches(mesh: TriangleMesh) -> Int[np.ndarray, " faces"]:
     """Return, for each triangle of a mesh, the number of the flat face that it is part of."""
+    from scipy.sparse import coo_matrix  # takes long to import
+    from scipy.sparse.csgraph import connected_components
+
     one, other = np.moveaxis(mesh.normals[mesh.neighbours], 1, 0)
     cosines = np.einsum("px,px->p", one, other)
     angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), cosines)

@@ -66,6 +66,21 @@ def test_what_simulates_nothing_loads_neither_the_ray_tracer_nor_matplotlib() ->
     assert done.returncode == 0, done.stderr
 
 
+def test_an_estimate_loads_neither_scenarios_nor_packages_that_take_a_second_to_import() -> None:
+    program = (
+        "import sys\n"
+        "from mmslam.cli import app\n"
+        "import mmslam.location, estimator.localization.pipeline\n"
+        "heavy = {'mitsuba', 'sionna', 'simulator', 'scenes', 'matplotlib', 'scipy.stats',\n"
+        "    'scipy.optimize'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=CHECKOUT, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def test_scenes_lists_names_and_titles() -> None:
     result = mmslam("scenes")
     assert result.exit_code == 0
