@@ -18,7 +18,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.planar_array import planar_array, spans_a_plane
-from estimator.imaging.phase_curvature import aligned_profiles
+from estimator.imaging.phase_curvature import profiles_at
 from estimator.imaging.range_compression import RangeProfiles, range_profiles
 from estimator.measurement.model import Echo, MeasurementError, Uplink
 
@@ -110,12 +110,15 @@ def _focused(data: Echo | Uplink) -> tuple[float, float]:
     steps = int(np.ceil(2 * STEPS * ways * extent / wave))
     sines = np.linspace(-1.0, 1.0, steps + 1)
     same = range_profiles(data)
-    other = range_profiles(replace(data, samples=data.samples.conj()))
     longest = same.unambiguous / ways
     ranges = _strongest(same, NEAREST * extent * ways) / ways
     flat = _brightest(same, ranges + longest * np.ceil(FLAT / longest), sines)
     here = max(flat, _brightest(same, ranges, sines))
-    there = max(flat, _brightest(other, longest - ranges, sines))
+    # A profile with a period is, of the conjugate, the conjugate of the same at minus the length.
+    other, sign = same, -1.0
+    if same.coefficients.shape[1] != round(longest * ways / same.cell):
+        other, sign = range_profiles(replace(data, samples=data.samples.conj())), 1.0
+    there = max(flat, _brightest(other, longest - ranges, sines, sign))
     return here, there
 
 
@@ -145,11 +148,17 @@ def _brightest(
     profiles: RangeProfiles,
     ranges: Float[np.ndarray, " ranges"],
     sines: Float[np.ndarray, " sines"],
+    sign: float = 1.0,
 ) -> float:
+    """Return the largest intensity in a plane at some ranges, with the lengths' sign. [-]."""
     most = 0.0
     for reach in ranges:
         x, y = reach * sines, reach * np.sqrt(1 - sines**2)
-        points = np.stack([x, y, np.zeros_like(x)], axis=-1)
-        focused = np.abs(aligned_profiles(profiles, points, 0.0).sum(axis=-1)) ** 2
+        path = sum(
+            np.sqrt((x[:, None] - a) ** 2 + (y[:, None] - b) ** 2 + c**2)
+            for a, b, c in (ends.T for ends in profiles.legs)
+        )
+        read = profiles_at(profiles, sign * profiles.passes * path)
+        focused = np.abs(read.sum(axis=-1)) ** 2
         most = max(most, float(focused.max()))
     return most

@@ -16,7 +16,7 @@ smooth flat or convex surface, which is seen directly.
 """
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex64, Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution_cell import Resolution
@@ -125,17 +125,43 @@ def coherence_factor(
 
 def aligned_profiles(
     profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], farther: float
-) -> Complex[np.ndarray, "points channels"]:
+) -> Complex64[np.ndarray, "points channels"]:
     """Read each channel's profile at each point, the path's phase taken out."""
-    path = sum(np.linalg.norm(points[:, None] - leg, axis=-1) for leg in profiles.legs)
-    length = profiles.passes * path + 2 * farther
+    path = sum(_distances(points, leg) for leg in profiles.legs)
+    return profiles_at(profiles, profiles.passes * path + 2 * farther)
+
+
+def profiles_at(
+    profiles: RangeProfiles, length: Float[np.ndarray, "points channels"]
+) -> Complex64[np.ndarray, "points channels"]:
+    """Read each channel's profile at path lengths of its own, their phase taken out.
+
+    Places and phases are reduced in float64, what is left of them is as exact as the profiles.
+
+    Parameters
+    ----------
+    profiles
+        Of uniform frequencies, if lengths are beyond the unambiguous one, or negative.
+    length
+        Of the paths. [m]
+    """
     place = length / profiles.cell
     whole = np.rint(place)
-    part = place - whole
+    part = (place - whole).astype(np.float32)
     channels, cells, _ = profiles.coefficients.shape
     cubic = profiles.coefficients[np.arange(channels), whole.astype(np.int64) % cells]
     value = cubic[..., 3]
     for order in (2, 1, 0):
         value = value * part + cubic[..., order]
-    aligned: np.ndarray = value * np.exp(2j * np.pi * profiles.carrier / speed_of_light * length)
-    return aligned
+    turns = profiles.carrier / speed_of_light * length
+    angle = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+    turn = np.empty(angle.shape, dtype=np.complex64)
+    turn.real, turn.imag = np.cos(angle), np.sin(angle)
+    return np.asarray(value * turn)
+
+
+def _distances(
+    points: Float[np.ndarray, "points 3"], ends: Float[np.ndarray, "channels 3"]
+) -> Float[np.ndarray, "points channels"]:
+    x, y, z = (points[:, None, axis] - ends[:, axis] for axis in range(3))
+    return np.asarray(np.sqrt(x * x + y * y + z * z))

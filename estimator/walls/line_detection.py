@@ -169,8 +169,16 @@ def on_segment(
     along = line.end - line.start
     length = float(np.linalg.norm(along))
     direction = along / length
-    places = (peaks - line.start) @ direction
-    margin = BEYOND_END * resolution.cell(peaks, direction)
-    beside = _near_lines(peaks, line.start[None], direction[None], resolution, tolerance)[0]
-    members: np.ndarray = beside & (places > -margin) & (places < length + margin)
+    # Most of an image's pixels are farther away than any cell is wide.
+    farthest = float(np.sqrt(np.einsum("px,px->p", peaks, peaks).max(initial=0.0)))
+    widest = tolerance * max(resolution.along_ray, resolution.across_ray * farthest)
+    across = peaks[:, :2] @ [direction[1], -direction[0]]
+    across -= line.start[0] * direction[1] - line.start[1] * direction[0]
+    near = np.flatnonzero(np.abs(across) <= 1.001 * widest)
+    some = peaks[near]
+    places = (some - line.start) @ direction
+    margin = BEYOND_END * resolution.cell(some, direction)
+    beside = _near_lines(some, line.start[None], direction[None], resolution, tolerance)[0]
+    members = np.zeros(len(peaks), dtype=bool)
+    members[near] = beside & (places > -margin) & (places < length + margin)
     return members
