@@ -70,20 +70,23 @@ def point_profiles(
     sign = np.cos(sweep.count * per_range * bins)
     # The sine of a difference from those of both sides: exact to 1e-16, on a bin to 1e-9 of 1.
     at_point, at_bin = np.exp(1j * per_range * ranges), np.exp(1j * per_range * bins)
+    # Real and imaginary parts are lanes of their own, side by side as numpy holds them.
     of_point = [
-        arrays.Float64(np.ascontiguousarray(table, dtype=np.float64).ravel())
-        for part in (at_point, turn, carrier)
-        for table in (part.real, part.imag)
+        arrays.Float64(np.repeat(table.astype(np.float64), 2, axis=1).ravel())
+        for table in (at_point.real, at_point.imag, turn.real, turn.imag, rates)
     ]
-    of_point.append(arrays.Float64(np.ascontiguousarray(rates, dtype=np.float64).ravel()))
+    turned_carrier = 1j * carrier
+    of_point += [
+        arrays.Float64(np.ascontiguousarray(table).view(np.float64).ravel())
+        for table in (carrier, turned_carrier)
+    ]
     of_bin = [arrays.Float64(table) for table in (at_bin.real, at_bin.imag, sign)]
 
-    lanes = positions * bins.size * points
-    lane = dr.arange(arrays.UInt32, lanes)
-    row, point = row_and_column(lane, points)
+    lane = dr.arange(arrays.UInt32, 2 * positions * bins.size * points)
+    row, part = row_and_column(lane, 2 * points)
     position, column = row_and_column(row, bins.size)
-    entry = position * dr.opaque(arrays.UInt32, points) + point
-    cosine_p, sine_p, cosine_n, sine_n, carrier_re, carrier_im, rate = (
+    entry = position * dr.opaque(arrays.UInt32, 2 * points) + part
+    cosine_p, sine_p, cosine_n, sine_n, rate, along, across = (
         dr.gather(arrays.Float64, table, entry) for table in of_point
     )
     cosine_b, sine_b, turned = (dr.gather(arrays.Float64, table, column) for table in of_bin)
@@ -100,13 +103,7 @@ def point_profiles(
     falling = (turned * cosine_n * count - kernel * cosine) * inverse * scale
     real = dr.select(on_bin, 0.0, -falling) * rate
     imag = -opaque(wavenumber) * kernel * rate
-    profiles, slopes = (dr.empty(arrays.Float64, 2 * lanes) for _ in range(2))
-    for table, re, im in (
-        (profiles, kernel * carrier_re, kernel * carrier_im),
-        (slopes, real * carrier_re - imag * carrier_im, real * carrier_im + imag * carrier_re),
-    ):
-        dr.scatter(table, re, 2 * lane)
-        dr.scatter(table, im, 2 * lane + 1)
+    profiles, slopes = kernel * along, real * along + imag * across
     dr.eval(profiles, slopes)
     shape = positions * bins.size, points
     return (

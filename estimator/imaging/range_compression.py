@@ -100,7 +100,13 @@ def range_profiles(
     whole = np.rint(offsets).astype(np.int64)
     if np.abs(offsets - whole).max() <= UNEVEN_STEPS:
         spectrum = np.zeros((len(samples), cells, _ORDER), dtype=np.complex64)
-        spectrum[:, whole] = tapered.astype(np.complex64)[:, :, None] * fit.astype(np.complex64)
+        values, cubics = tapered.astype(np.complex64)[:, :, None], fit.astype(np.complex64)
+        if int(whole[-1] - whole[0]) == whole.size - 1:  # no holes: two blocks, before and from 0
+            below = int(np.searchsorted(whole, 0))
+            np.multiply(values[:, :below], cubics[:below], out=spectrum[:, cells - below :])
+            np.multiply(values[:, below:], cubics[below:], out=spectrum[:, : whole.size - below])
+        else:
+            spectrum[:, whole] = values * cubics
         table = scipy.fft.ifft(spectrum, axis=1, norm="forward", workers=-1, overwrite_x=True)
     else:
         # No period: two more cells, for lengths that round up to the unambiguous one.
