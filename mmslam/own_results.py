@@ -9,6 +9,7 @@ MEASUREMENT = "measurement.zarr"
 REPORT = "report.html"
 TRACK = "track.json"
 TRACK_FIGURE = "track.png"
+TRACK_PAGE = "track.html"
 IMAGE = "image.json"
 FORMAT = 1
 
@@ -27,7 +28,7 @@ def refuse_foreign_results(folder: Path) -> str | None:
 
 def refuse_foreign_track(folder: Path) -> str | None:
     """Say why a folder may not be replaced by a new track; None if an earlier one is in it."""
-    return _refuse_foreign(folder, TRACK, {"tracks", "versions"}, {TRACK_FIGURE})
+    return _refuse_foreign(folder, TRACK, {"tracks", "versions"}, {TRACK_FIGURE, TRACK_PAGE})
 
 
 def refuse_foreign_image(folder: Path) -> str | None:

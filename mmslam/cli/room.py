@@ -37,9 +37,15 @@ def scenes(
         bool,
         typer.Option("--show", help="Draw NAME, from above and in 3-D, with its specular paths."),
     ] = False,
+    in_space: Annotated[
+        bool,
+        typer.Option("--3d", help="With --show: a page (HTML) in which NAME is turned in 3-D."),
+    ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE.png", help="Where to draw it [out/NAME.png]."),
+        typer.Option(
+            "--out", metavar="FILE", help="Where to draw it [out/NAME.png; with --3d .html]."
+        ),
     ] = None,
     export: Annotated[
         Path | None,
@@ -65,6 +71,8 @@ def scenes(
         from mmslam.commands import scenarios as commands
         from scenes.files.loading import scenario_schema
 
+        if in_space and not show:
+            raise typer.BadParameter("--3d says how NAME is drawn; add --show")
         if schema:
             print_json(scenario_schema())
         elif new is not None:
@@ -79,7 +87,8 @@ def scenes(
             scenario = mmslam.load_scenario(name, overrides or [])
             commands.show_scenario(
                 scenario,
-                picture=_picture(show, out, scenario.name),
+                picture=_picture(show, out, f"{scenario.name}.{'html' if in_space else 'png'}"),
+                in_space=in_space,
                 export=export,
                 seed=seed,
                 as_json=as_json,
@@ -290,9 +299,31 @@ def track(
             typer.echo(visible(line))
 
 
+def view(
+    place: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OUT", help="A folder that run, locate, track or image wrote, or a page."
+        ),
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Open the page of a result in the browser; without a display, print where it is."""
+    with told_clearly():
+        from mmslam.commands.view import opened, page_of
+
+        page = page_of(place)
+        with stdout_kept_clean():
+            seen = opened(page)
+        if as_json:
+            print_json({"page": str(page), "opened": seen})
+        else:
+            typer.echo(visible(f"{'opened' if seen else 'open'} {page}"))
+
+
 def _picture(show: bool, out: Path | None, name: str) -> Path | None:
     if not show:
         if out is not None:
             raise typer.BadParameter("--out says where the picture goes; add --show")
         return None
-    return out or Path("out") / f"{name}.png"
+    return out or Path("out") / name

@@ -32,7 +32,13 @@ def list_scenarios(*, export: Path | None, as_json: bool) -> None:
 
 
 def show_scenario(
-    scenario: Scenario, *, picture: Path | None, export: Path | None, seed: int, as_json: bool
+    scenario: Scenario,
+    *,
+    picture: Path | None,
+    export: Path | None,
+    seed: int,
+    as_json: bool,
+    in_space: bool = False,
 ) -> None:
     """Print a scenario, or draw it, or export it.
 
@@ -41,17 +47,19 @@ def show_scenario(
     scenario
         What is shown.
     picture
-        PNG file for its plan; its path is printed instead of the scenario.
+        File for its picture; its path is printed instead of the scenario.
     export
         Folder for its TOML, XML and PLY files; likewise.
     seed
         Of the roughness in the exported facets.
     as_json
         Whether the scenario is printed as JSON, not as TOML.
+    in_space
+        Whether the picture is a page in which the room is turned, not a PNG.
     """
     written = []
     if picture is not None:
-        written.append(_draw(scenario, picture))
+        written.append((_lay_out if in_space else _draw)(scenario, picture))
     if export is not None:
         written += _export_toml(scenario, export)
         written += _export_meshes(scenario, export, seed)
@@ -142,6 +150,23 @@ def _draw(scenario: Scenario, path: Path) -> Path:
     drawn_plainly(figure)
     figure.savefig(drawn, dpi=DOTS_PER_INCH, format="png", metadata={"Software": None})
     _write(path, drawn.getvalue())
+    return path
+
+
+def _lay_out(scenario: Scenario, path: Path) -> Path:
+    if path.suffix != ".html":
+        raise OutputError(f"--out {path}: --3d writes a page; call it {path.stem}.html")
+    from mmslam.results.page.single_file import can_draw, render_page
+
+    if not can_draw():
+        raise OutputError("--3d needs the package plotly, which mmslam asks for; install it")
+    with stdout_kept_clean():
+        from mmslam.results.page.room import SCRIPTS_ROOM, room_document
+        from simulator.scene.scenario_paths import scenario_paths
+
+        document = room_document(scenario, scenario_paths(scenario))
+    page = render_page("room.html.j2", document, SCRIPTS_ROOM)
+    _write(path, page.encode())
     return path
 
 

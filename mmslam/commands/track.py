@@ -157,11 +157,17 @@ def track_to_folder(
         ]
         document = track_document(users, truths, acceleration=acceleration)
         # matplotlib's import takes half a second that other commands need not wait.
+        from mmslam.results.page.single_file import can_draw, render_page
+        from mmslam.results.page.tracks import SCRIPTS_TRACK, tracks_document
         from mmslam.results.pictures_2d import save
         from mmslam.results.track_figure import track_figure
 
         figure = track_figure(users, truths, tracks.mirrors, tracks.aperture)
         save(figure, new / own_results.TRACK_FIGURE)
+        if can_draw():
+            shown = tracks_document(users, truths, tracks.mirrors, tracks.aperture)
+            page = render_page("track.html.j2", shown, SCRIPTS_TRACK)
+            (new / own_results.TRACK_PAGE).write_text(page, encoding="utf-8")
         (new / own_results.TRACK).write_text(to_json(document), encoding="utf-8")
     return Tracked(folder=folder, document=document)
 
@@ -201,7 +207,8 @@ def track_lines(document: Mapping[str, Any], folder: Path) -> Iterator[str]:
                 f"{one['name']}: another choice among ambiguous answers is "
                 f"{100 * one['rival']:.0f} % as probable"
             )
-    yield f"open {folder / own_results.TRACK_FIGURE}"
+    page = folder / own_results.TRACK_PAGE
+    yield f"open {page if page.exists() else folder / own_results.TRACK_FIGURE}"
 
 
 def _told(fix: Mapping[str, Any], point: Mapping[str, Any] | None) -> str:

@@ -69,7 +69,9 @@ def plan_document(
         "images": _images(estimate, view),
         "volumes": _volumes(estimate),
         "array": chosen.tolist(),
-        "mirrors": [_mirror(index, mirror) for index, mirror in enumerate(estimate.mirrors)],
+        "mirrors": [
+            mirror_document(index, mirror) for index, mirror in enumerate(estimate.mirrors)
+        ],
         "targets": [_target(index, target) for index, target in enumerate(estimate.targets)],
         "users": [_user(user) for user in estimate.users],
         "truth": {
@@ -117,6 +119,27 @@ def prediction_document(
         "level_db": known.level_db.tolist(),
         "deviation_db": np.sqrt(np.diag(known.covariance)).tolist(),
         "max_bounces": _bounces(estimate),
+    }
+
+
+def mirror_document(index: int, mirror: Mirror) -> dict[str, Any]:
+    """Lay out a mirror, with what the pointer is told of it.
+
+    Parameters
+    ----------
+    index
+        Its number in the estimate.
+    mirror
+        Of a linear or a planar array.
+    """
+    return {
+        "name": f"mirror {index}",
+        "line": [mirror.start.tolist(), mirror.end.tolist()],
+        "corners": None if mirror.corners is None else mirror.corners.tolist(),
+        "confidence": mirror.confidence,
+        "level_db": mirror.level_db if np.isfinite(mirror.level_db) else None,
+        "offset_deviation_m": float(np.sqrt(max(mirror.covariance[-1, -1], 0.0))),
+        "seen_through": list(mirror.seen_through),
     }
 
 
@@ -195,18 +218,6 @@ def _outline(mirror: Mirror) -> list[list[float]]:
     corners = np.stack([mirror.start, mirror.end]) if mirror.corners is None else mirror.corners
     line: list[list[float]] = corners.tolist()
     return line
-
-
-def _mirror(index: int, mirror: Mirror) -> dict[str, Any]:
-    return {
-        "name": f"mirror {index}",
-        "line": [mirror.start.tolist(), mirror.end.tolist()],
-        "corners": None if mirror.corners is None else mirror.corners.tolist(),
-        "confidence": mirror.confidence,
-        "level_db": mirror.level_db if np.isfinite(mirror.level_db) else None,
-        "offset_deviation_m": float(np.sqrt(max(mirror.covariance[-1, -1], 0.0))),
-        "seen_through": list(mirror.seen_through),
-    }
 
 
 def _target(index: int, target: Target) -> dict[str, Any]:

@@ -25,11 +25,26 @@ async function drawSpace(plot, box, things) {
   };
   const axis = (name) => ({ title: { text: `${name} [m]` }, color: cssColour("--ink"),
     gridcolor: cssColour("--line"), backgroundcolor: "rgba(0,0,0,0)" });
+  // The eye stands back as far as the longest side asks for; Plotly makes the volume 1.
+  const sides = [0, 1, 2].map((i) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (const thing of things) {
+      for (const point of thing.points) {
+        if (point[i] === null) continue;
+        low = Math.min(low, point[i]);
+        high = Math.max(high, point[i]);
+      }
+    }
+    return high - low;
+  });
+  const longest = Math.max(...sides, 1e-9);
+  const cube = Math.cbrt(sides.reduce((product, side) => product * Math.max(side, 0.01 * longest), 1));
+  const back = Math.max(1, 0.85 * longest / cube);
   const redraw = () => Plotly.react(plot, things.map(trace), {
     ...baseLayout(),
     margin: { l: 0, r: 0, t: 0, b: 0 },
     scene: { aspectmode: "data", xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"),
-      camera: { eye: { x: 0.9, y: -1.5, z: 0.9 } }, uirevision: "kept" },
+      camera: { eye: { x: 0.9 * back, y: -1.5 * back, z: 0.9 * back } }, uirevision: "kept" },
   }, { ...PLOT_OPTIONS, scrollZoom: !narrow.matches });
   layerSwitches(box, layers, redraw);
   await redraw();

@@ -244,3 +244,16 @@ def test_an_override_without_set_is_refused_with_the_option_that_it_lacks(
     plain = refused(*command, "slam_2d", "again")
     assert "extra argument (again)" in plain
     assert "--set" not in plain
+
+
+def test_a_room_is_written_as_a_page_to_turn(away: Path) -> None:
+    pytest.importorskip("plotly")
+    assert mmslam("scenes", "slam_2d", "--show", "--3d").stdout == "out/slam_2d.html\n"
+    page = (away / "out" / "slam_2d.html").read_text(encoding="utf-8")
+    assert '"layer":"paths to users"' in page
+    told = mmslam("scenes", "slam_2d", "--show", "--3d", "--out", "room.html", "--json").stdout
+    assert json.loads(told)["files"] == ["room.html"]
+    assert "add --show" in refused("scenes", "slam_2d", "--3d")
+    assert "call it room.html" in refused(
+        "scenes", "slam_2d", "--show", "--3d", "--out", "room.png"
+    )

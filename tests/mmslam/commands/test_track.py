@@ -1,6 +1,7 @@
 """``mmslam track`` on pilots in closed form."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from typer.testing import CliRunner, Result
 from estimator.measurement.model import Measurement, Uplink
 from estimator.measurement.store import measurement_to_dataset
 from mmslam.cli import app
+from mmslam.results.page.single_file import can_draw
 from validation.analytic.point_scatterer import complex_noise, point_uplink
 
 FREQUENCIES = np.linspace(220e9, 295e9, 101)  # 0.4 m of unambiguous path
@@ -71,6 +73,14 @@ def test_a_walk_is_told_written_and_drawn(store: Path) -> None:
         assert off @ np.linalg.solve(spread, off) < 30  # once in three million
         assert point["truth_m"] is None
     assert Path("out/walk-track/track.png").stat().st_size > 10_000
+    if can_draw():
+        page = Path("out/walk-track/track.html").read_text(encoding="utf-8")
+        (data,) = re.findall(r'id="page-data">(.*?)</script>', page, flags=re.DOTALL)
+        shown = json.loads(data)
+        assert shown["times"] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+        moments = shown["tracks"][0]["moments"]
+        assert [moment["point"]["bridged"] for moment in moments] == [False, False, True, False]
+        assert lines[-1] == "open out/walk-track/track.html"
     # The same again replaces what it wrote; anything else stays.
     assert track(str(store)).exit_code == 0
     Path("out/walk-track/mine.txt").write_text("mine", encoding="utf-8")

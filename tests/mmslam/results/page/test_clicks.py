@@ -14,9 +14,15 @@ from estimator.measurement.model import Measurement
 from estimator.results.deferred import Deferred
 from estimator.results.estimate import Estimate, Image, Images
 from estimator.results.pixel_grid import PixelGrid
+from mmslam.moving_users import track_answers
 from mmslam.results.document import result_document
 from mmslam.results.page.plan import plan_document
+from mmslam.results.page.room import SCRIPTS_ROOM, room_document
+from mmslam.results.page.single_file import render_page
+from mmslam.results.page.tracks import SCRIPTS_TRACK, tracks_document
 from mmslam.results.report import render_report
+from scenes.files.loading import load_scenario
+from simulator.scene.scenario_paths import scenario_paths
 from validation.metrics.truth import Truth
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
@@ -295,3 +301,50 @@ def test_a_volume_is_sliced_along_each_axis_and_shown_in_space(
     assert page.locator("#moved-height").is_visible()
     page.mouse.click(*at(page, 0.3, 0.4))
     until(page, "document.getElementById('moved-place').textContent.includes('(0.30')")
+
+
+def test_a_room_is_turned_in_space_and_its_layers_are_switched(opened: Opened) -> None:
+
+    scenario = load_scenario("slam_2d")
+    document = room_document(scenario, scenario_paths(scenario))
+    document["title"] = "<img src=x onerror=alert(1)>"
+    page = opened(render_page("room.html.j2", document, SCRIPTS_ROOM), width=420)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    assert page.locator("h1").text_content() == "<img src=x onerror=alert(1)>"
+    shown = "document.getElementById('space-plot').data.filter(t => t.visible).length"
+    for box in page.locator("#space-layers input").all():
+        before = page.evaluate(shown)
+        box.click()
+        assert page.evaluate(shown) < before
+    assert page.evaluate(shown) == 0
+
+
+def test_the_slider_shows_where_a_moving_user_is(opened: Opened, estimate: Estimate) -> None:
+
+    times = [0.0, 0.1, 0.2, 0.3]
+    (user,) = estimate.users
+    assert user.position is not None
+    way = [user.position + np.array([0.02 * step, 0.0, 0.0]) for step in range(4)]
+    found = [{"ann": replace(user, position=place)} for place in way]
+    found[2] = {}  # bridged
+    tracked = track_answers(times, found)
+    truths = [{"ann": place} for place in way]
+    document = tracks_document(tracked, truths, estimate.mirrors, np.zeros((2, 3)))
+    page = opened(render_page("track.html.j2", document, SCRIPTS_TRACK))
+    shapes = "document.getElementById('track-plot').layout.shapes"
+    for moment, place in enumerate(way):
+        page.locator("#track-time").fill(str(moment))
+        assert page.locator("#track-now").text_content() == f"{times[moment]:.3f} s"
+        ring = page.evaluate(f"[{shapes}[0].xanchor, {shapes}[0].yanchor]")
+        point = tracked[0].track.points[moment]
+        assert ring == pytest.approx(point.position[:2])
+        assert ring == pytest.approx(place[:2], abs=0.01)
+        row = page.locator("#track-table td").all_text_contents()
+        assert row[0] == "ann"
+        assert ("bridged" in row[4]) is (moment == 2)
+        assert row[5].endswith("mm")
+    page.get_by_role("button", name="play").click()  # from the start, to the end
+    until(page, "document.getElementById('track-time').value === '3'")
+    page.get_by_role("button", name="zoom to the tracks").click()
+    page.locator("[data-layer=ellipses]").click()
+    assert page.evaluate("document.getElementById('track-plot').data.every(t => t.visible)")

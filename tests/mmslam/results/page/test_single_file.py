@@ -94,7 +94,7 @@ def test_without_a_plan_the_page_may_run_nothing(
     assert "default-src &#39;none&#39;" in page
 
 
-@pytest.mark.parametrize("name", ["page.js", *SCRIPTS_3D])
+@pytest.mark.parametrize("name", ["page.js", *SCRIPTS_3D, "track.js", "start_room.js"])
 def test_no_script_of_ours_makes_markup_of_text(name: str) -> None:
     source = script_source(name)
     for way in (
