@@ -127,7 +127,7 @@ def aligned_profiles(
     profiles: RangeProfiles, points: Float[np.ndarray, "points 3"], farther: float
 ) -> Complex64[np.ndarray, "points channels"]:
     """Read each channel's profile at each point, the path's phase taken out."""
-    path = sum(_distances(points, leg) for leg in profiles.legs)
+    path = np.sum([_distances(points, leg) for leg in profiles.legs], axis=0)
     return profiles_at(profiles, profiles.passes * path + 2 * farther)
 
 

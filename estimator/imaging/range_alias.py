@@ -15,9 +15,10 @@ wave, which distinguishes it from both.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float
 from scipy.constants import speed_of_light
 
+from estimator.array.planar_array import spans_a_plane
 from estimator.array.resolution_cell import Resolution
 from estimator.imaging.phase_curvature import (
     RANGE_SHIFTS,
@@ -120,17 +121,16 @@ def focus_by_range(
     resolution
         Of the echo.
     """
-    across = np.mean(profiles.legs, axis=0)[:, 0]
-    tilts = np.exp(1j * np.pi * SHIFTS[:, None] * over_half_aperture(profiles))
+    middles = np.mean(profiles.legs, axis=0)
+    tilts = _tilts(profiles, middles)
     wavenumber = 2 * np.pi * profiles.carrier / speed_of_light
     reach = np.linalg.norm(points, axis=-1, keepdims=True)
     # Of a path of `passes` legs each way; a monostatic echo's profiles end at twice c/2Δf.
     longer = profiles.unambiguous / (profiles.passes * len(profiles.legs))
     places = [points * (reach + order * longer) / reach for order in range(ORDERS + 1)]
     lengths = [_lengths(profiles, place) for place in places]
-    sines = points[:, 0] / reach[:, 0]
     ways = profiles.passes * len(profiles.legs)
-    lengths.append(-ways * sines[:, None] * (across - across.mean()))
+    lengths.append(-ways * (points / reach) @ (middles - middles.mean(axis=0)).T)
     best = np.zeros((len(lengths), len(points)))
     for shift in RANGE_SHIFTS:
         aligned = aligned_profiles(profiles, points, shift * resolution.along_ray)
@@ -175,6 +175,18 @@ def brightest_from_beyond(
             focused = np.abs(aligned_profiles(profiles, points, 0.0).sum(axis=-1)) ** 2
             brightest[order] = max(brightest[order], float(focused.max()))
     return float(brightest[1:].max() / brightest[0]) if brightest[0] > 0 else 0.0
+
+
+def _tilts(
+    profiles: RangeProfiles, middles: Float[np.ndarray, "channels 3"]
+) -> Complex[np.ndarray, "tilts channels"]:
+    """Return the phases over an array of waves from beside a peak, as far as its pixel is wide."""
+    along: np.ndarray = np.exp(1j * np.pi * SHIFTS[:, None] * over_half_aperture(profiles))
+    if not spans_a_plane(middles):
+        return along
+    height = middles[:, 2] - middles[:, 2].mean()
+    up = np.exp(1j * np.pi * SHIFTS[:, None] * height / (0.5 * np.ptp(height)))
+    return np.asarray((along[:, None] * up).reshape(-1, len(middles)))
 
 
 def _lengths(

@@ -1,5 +1,7 @@
 """Notes on arrays and sweeps whose steps are too coarse to image all angles and ranges."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.constants import speed_of_light
@@ -28,6 +30,33 @@ def aliasing_notes(
         f"positions {1e3 * spacing:.3g} mm apart tell echoes from their grating lobes within "
         f"{np.degrees(np.arcsin(sine)):.1f}° of broadside only; the image ends there",
     )
+
+
+def order_notes(
+    distances: Sequence[float], orders: Sequence[Float[np.ndarray, " orders"]], step: float
+) -> tuple[str, ...]:
+    """Say of which walls the frequency step does not tell how far away they are.
+
+    Parameters
+    ----------
+    distances
+        Of the walls' planes from the array, as they are imaged. [m]
+    orders
+        Of each, how probable it is that it stands there, or farther by one or more steps.
+    step
+        Distance after which ranges repeat, c/2Δf. [m]
+    """
+    notes = []
+    for distance, chances in zip(distances, orders, strict=True):
+        others = np.flatnonzero(chances[1:]) + 1
+        if others.size:
+            there = " or ".join(f"{distance + order * step:.2f} m" for order in others)
+            notes.append(
+                f"the wall that faces the array at {distance:.2f} m may stand at {there} as well: "
+                f"ranges repeat every {step:.2f} m, and its reflection is a flat wave from any "
+                "distance; smaller frequency steps would tell"
+            )
+    return tuple(notes)
 
 
 FEWEST_BEYOND = 5

@@ -19,7 +19,7 @@ from estimator.channel.angle_range_map_3d import direction_map
 from estimator.channel.path import LEAST_SHARE
 from estimator.channel.path_extraction_3d import find_space_paths
 from estimator.imaging.point_levels import point_levels_db
-from estimator.localization.aliasing import aliasing_notes
+from estimator.localization.aliasing import aliasing_notes, order_notes
 from estimator.localization.close_range import close_scene, too_large
 from estimator.localization.constant_room import RoomBehindConstant
 from estimator.localization.imaged_scene import imaged_scene
@@ -28,10 +28,12 @@ from estimator.mapping.map_3d import (
     SpaceMap,
     build_space_map,
     mirrors_in_world,
+    other_rooms,
     peaks_aside,
     targets_in_world,
 )
 from estimator.mapping.map_images_3d import space_images
+from estimator.mapping.range_order import unambiguous_range
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.positioning.map_context import MapContext
 from estimator.results.estimate import (
@@ -72,13 +74,21 @@ class PlanarRoom:
                 self.echo, self.array, self.map, heading, farthest
             ),
             levels=partial(point_levels_db, self.echo),
+            rooms=other_rooms(self.map, self.echo),
         )
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Where the image ends."""
         sine = self.array.unaliased(self.echo.frequencies, passes=2)
-        return aliasing_notes(max(self.array.spacing), self.echo.frequencies, sine)
+        return (
+            *aliasing_notes(max(self.array.spacing), self.echo.frequencies, sine),
+            *order_notes(
+                [abs(float(wall.centre @ wall.normal)) for wall in self.map.walls],
+                self.map.orders,
+                unambiguous_range(self.echo),
+            ),
+        )
 
     def refined(self, found: UserEstimate, uplink: Uplink) -> UserEstimate:
         """Return the answer itself: what rough walls scatter is searched in the plane only."""

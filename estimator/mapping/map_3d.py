@@ -16,12 +16,24 @@ from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.specular_chains import Chain, chain_to, unfolded_over
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, mirrored_about
 from estimator.geometry.wall_covariance import joint_covariance
+from estimator.imaging.range_compression import range_profiles
 from estimator.imaging.survey_3d import VolumeSurvey, peaks_around, survey_volume
+from estimator.mapping.range_order import (
+    order_probabilities,
+    other_distances,
+    unambiguous_range,
+)
 from estimator.mapping.wall_unfolding import confidence_of
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
-from estimator.walls.wall_detection_3d import detect_planes, lobe_of_a_wall, unassigned_peaks
+from estimator.walls.wall_detection_3d import (
+    Planes,
+    detect_planes,
+    lobe_of_a_wall,
+    peaks_on,
+    unassigned_peaks,
+)
 
 TARGET_LEVEL = 1e-3
 """Intensity, over that of the brightest target, of what still is one: −30 dB. With half and twice
@@ -56,6 +68,12 @@ lobe falls by :data:`SKIRT`. [pixels]"""
 SAME_TARGET = 3.0
 """Distance across the ray within which two targets are one, seen two ways: as for walls
 (:data:`ON_PLANE`). [cells]"""
+MOST_UNASSIGNED = 24
+"""Strongest peaks on no wall that are asked whether they are grating lobes, for time: twice those
+that a wall is suspected between (:data:`estimator.positioning.blockage.LOOSE_PEAKS`). [-]"""
+MOST_ROOMS = 8
+"""Combinations of the walls' distances that users are placed in, for time: two walls with three
+distances each have nine. [-]"""
 LEAST_BACKGROUND = 1e-300
 """Least background that a level is divided by: above 0 in float64. [-]"""
 
@@ -78,6 +96,8 @@ class SpaceMap:
     planes: tuple[FittedPlane, ...]  # as the raw image shows them
     walls: tuple[PlaneWall, ...]  # the same at their true place
     seen_through: tuple[tuple[int, ...], ...]  # indices of walls, from the array outward
+    orders: tuple[Float[np.ndarray, " orders"], ...]
+    """How probable it is of each that it stands there, or farther by c/2Δf, 2 c/2Δf, ..."""
     joint_covariance: Float[np.ndarray, "parameters parameters"]
     """Of all walls' (two tilts [rad], offset [m]), one wall after the other."""
     targets: tuple[SpaceTarget, ...]  # strongest first
@@ -98,7 +118,8 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     """
     looked = survey_volume(echo, array)
     coarse = coarse_resolution(planar_resolution(array, echo))
-    planes, walls, seen = unfold_planes(detect_planes(echo, array, looked).fitted, coarse)
+    fitted, chances = _within_range(detect_planes(echo, array, looked), echo, array, looked)
+    planes, walls, seen = unfold_planes(fitted, coarse)
     joint = joint_covariance(
         [plane.wall for plane in planes], seen, walls, reflected=mirrored_wall, change=plane_change
     )
@@ -109,11 +130,57 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
             for i, wall in enumerate(walls)
         ),
         joint_covariance=joint,
-        unassigned_peaks=unassigned_peaks(looked.peaks, planes, coarse),
+        unassigned_peaks=_of_no_wall(
+            unassigned_peaks(looked.peaks, planes, coarse), planes, echo, array
+        ),
         seen_through=seen,
+        orders=tuple(
+            next(chance for plane, chance in zip(fitted, chances, strict=True) if plane is one)
+            for one in planes
+        ),
         targets=_targets(echo, array, looked, [plane.wall for plane in planes], walls),
         survey=looked,
     )
+
+
+def _within_range(
+    planes: Planes, echo: Echo, array: PlanarArray, looked: VolumeSurvey
+) -> tuple[tuple[FittedPlane, ...], tuple[Float[np.ndarray, " orders"], ...]]:
+    """Leave out planes that are echoes from beyond; return the orders of the others."""
+    coarse = coarse_resolution(planar_resolution(array, echo))
+    profiles = range_profiles(echo)
+    kept, orders = [], []
+    for plane, head_on in zip(planes.fitted, planes.head_on, strict=True):
+        peaks = looked.peaks[peaks_on(looked.peaks, plane.wall, coarse)]
+        chances = order_probabilities(
+            plane.wall, peaks, echo, array, flat_wave=head_on, profiles=profiles
+        )
+        if chances.any():
+            kept.append(plane)
+            orders.append(chances)
+    return tuple(kept), tuple(orders)
+
+
+def _of_no_wall(
+    peaks: Float[np.ndarray, "peaks 3"],
+    planes: Sequence[FittedPlane],
+    echo: Echo,
+    array: PlanarArray,
+) -> Float[np.ndarray, "kept 3"]:
+    """Leave out peaks that are grating lobes of a wall's part outside of the imaged angles. [m]."""
+    walls = [plane.wall for plane in planes]
+    kept = [
+        not lobe_of_a_wall(echo, array, peak[None], np.ones(1), walls)
+        for peak in peaks[:MOST_UNASSIGNED]
+    ]
+    return np.concatenate([peaks[: len(kept)][kept], peaks[len(kept) :]])
+
+
+def other_rooms(room: SpaceMap, echo: Echo) -> tuple[tuple[float, tuple[PlaneWall, ...]], ...]:
+    """Return the walls at all distances that they may have, each choice with its probability."""
+    if all(chances[0] == 1.0 for chances in room.orders):
+        return ()
+    return other_distances(room.walls, room.orders, unambiguous_range(echo), most=MOST_ROOMS)
 
 
 def peaks_aside(
@@ -295,7 +362,9 @@ def _target(
 def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
     """Return the walls of a map, as they are reported."""
     mirrors = []
-    for plane, wall, through in zip(room.planes, room.walls, room.seen_through, strict=True):
+    for plane, wall, through, orders in zip(
+        room.planes, room.walls, room.seen_through, room.orders, strict=True
+    ):
         places = (wall.corners - wall.centre) @ wall.axes.T
         middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
         sides = np.array([[places[:, 0].min(), middle[1]], [places[:, 0].max(), middle[1]]])
@@ -306,7 +375,7 @@ def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
                 end=ends[1],
                 normal=frame.turned_to_world(wall.normal),
                 covariance=wall.covariance,
-                confidence=confidence_of(plane.confidence, through),
+                confidence=min(confidence_of(plane.confidence, through), float(orders[0])),
                 level_db=float(
                     10 * np.log10(plane.level / max(plane.background, LEAST_BACKGROUND))
                 ),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from estimator.channel.path import PathSet
 from estimator.positioning.known_clock import on_our_clock
 from estimator.positioning.map_context import MapContext
+from estimator.positioning.several_rooms import over_several_rooms
 from estimator.positioning.unknown_clock import on_any_clock
 from estimator.results.estimate import UserEstimate
 
@@ -35,7 +36,15 @@ def decide(
     """
     if not found.paths:
         return UserEstimate(name=name, status="not_found", reason="no wave stands out of the pilot")
-    answer = (on_our_clock if clock_known else on_any_clock)(name, found, room)
+    rule = on_our_clock if clock_known else on_any_clock
+    if room.rooms:
+        answers = [
+            (chance, rule(name, found, replace(room, walls=walls, rooms=())))
+            for chance, walls in room.rooms
+        ]
+        answer = over_several_rooms(answers, axes=found.how.coordinates)
+    else:
+        answer = rule(name, found, room)
     if answer.status == "found" and not room.imaged:
         reason = "no echo was measured, so mirrors are unknown; this is the place without any"
         answer = replace(answer, status="ambiguous", reason=reason, line_of_sight=None)

@@ -99,7 +99,7 @@ def _decided(
         (only,) = one.sightings
         wave = found.paths[only.path].wave
         if only.chain:
-            way = look_along_legs(alone, wave, only.chain, room, found.how)
+            way = look_along_legs(alone, wave, only.chain, room, found.how, found.frequency)
         else:
             way = look_along(alone, wave, room, found.how, found.frequency)
         through[number] = through_odds(one, found, room, way.sight)

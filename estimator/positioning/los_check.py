@@ -18,7 +18,6 @@ from estimator.geometry.flat_wall import FlatWall
 from estimator.geometry.path_tracing import project
 from estimator.geometry.specular_chains import Chain
 from estimator.geometry.wall_2d import Wall
-from estimator.geometry.wall_3d import within
 from estimator.positioning.blockage import (
     LEAST_IMAGE_CONTRAST,
     LOOSE_PEAKS,
@@ -32,7 +31,7 @@ from estimator.positioning.blockage import (
 from estimator.positioning.edge_evidence import UNTOLD, EdgeOdds, odds_of_edges
 from estimator.positioning.level_likelihood import BLOCKED
 from estimator.positioning.map_context import MapContext
-from estimator.positioning.unseen_mirrors import wall_behind, wall_between
+from estimator.positioning.unseen_mirrors import stands_straight, wall_behind, wall_between
 from estimator.results.estimate import UserEstimate
 
 LONGEST_UNSEEN = 0.5
@@ -159,7 +158,12 @@ def _as_edges(
 
 
 def look_along_legs(
-    answer: UserEstimate, wave: Wave, chain: Chain, room: MapContext, how: Bearing
+    answer: UserEstimate,
+    wave: Wave,
+    chain: Chain,
+    room: MapContext,
+    how: Bearing,
+    frequency: float | None = None,
 ) -> StraightWay:
     """Look for mirrors that cross a path beyond its first mirror, and that the map does not show.
 
@@ -171,26 +175,33 @@ def look_along_legs(
         That came over it.
     chain
         Its mirrors, from the array outward.
-    room, how
+    room, how, frequency
         As in :func:`look_along`.
     """
     points = room.unassigned_peaks[:LOOSE_PEAKS]
     if answer.path is None:
         return StraightWay(sight="clear", doubt=None)
+    between: list[tuple[FlatWall, Float[np.ndarray, "2 3"]]] = []
     for first, second in zip(*np.triu_indices(len(points), k=1), strict=True):
         wall: FlatWall | None = wall_between(points[first], points[second], room.resolution, how)
-        if wall is None or np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:
+        if wall is None or not stands_straight(wall):
+            continue
+        if np.linalg.norm(points[first] - points[second]) > LONGEST_UNSEEN:
             continue
         if _crosses(wall, answer.path):
-            return StraightWay(
-                sight="between ends",
-                doubt=UNSEEN_BEYOND,
-                otherwise=_over_one_more(answer, wave, chain, wall, room, how),
-            )
-    for point in points:
+            between.append((wall, points[[first, second]]))
+    if between:
+        return StraightWay(
+            sight="between ends",
+            doubt=UNSEEN_BEYOND,
+            otherwise=_over_one_more(answer, wave, chain, between[0][0], room, how),
+            edges=_as_edges([edges for _, edges in between], room, frequency),
+        )
+    # A single edge tells the wall behind it where all edges are upright: in the plane.
+    for point in points if len(how.coordinates) == 2 else ():
         if _beside_a_wall(point, room):
             continue
-        wall = wall_behind(point, room.resolution, how)
+        wall = wall_behind(point, room.resolution)
         if _crosses(wall, answer.path):
             return StraightWay(
                 sight="behind a point",
@@ -202,17 +213,12 @@ def look_along_legs(
 
 def _beside_a_wall(point: Float[np.ndarray, " 3"], room: MapContext) -> bool:
     """Tell whether a point is so near to a known wall that it may be a sidelobe of the wall's."""
-    reach = CLOUD * room.resolution.along_ray
     for wall in room.walls:
-        if isinstance(wall, Wall):
-            along = wall.end - wall.start
-            share = np.clip((point - wall.start) @ along / (along @ along), 0.0, 1.0)
-            if float(np.linalg.norm(point - wall.start - share * along)) < reach:
-                return True
-            continue
-        height = float((point - wall.centre) @ wall.normal)
-        foot = point - height * wall.normal
-        if abs(height) < reach and within(foot[None], wall, margin=reach)[0]:
+        assert isinstance(wall, Wall)
+        along = wall.end - wall.start
+        share = np.clip((point - wall.start) @ along / (along @ along), 0.0, 1.0)
+        apart = float(np.linalg.norm(point - wall.start - share * along))
+        if apart < CLOUD * room.resolution.along_ray:
             return True
     return False
 

@@ -38,6 +38,9 @@ class MapContext:
     """By how much the walls' echoes are later than they are curved; None where nothing tells."""
     aside: LookAside | None = None
     """Looks for what stands around a direction that the image does not show, if that can be."""
+    rooms: tuple[tuple[float, tuple[Wall, ...] | tuple[PlaneWall, ...]], ...] = ()
+    """The walls at all places where they may stand, each choice with its probability; empty if they
+    stand where :attr:`walls` says."""
     levels: Levels | None = None
     """How bright the image is at points; None where nothing tells."""
 

@@ -262,8 +262,10 @@ def unseen_odds(
     else:
         odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[way.sight]
     tilted = tilt_ratio(path, found, way="reflected", over="direct")
-    if excess is None and not only.chain:
-        odds *= SMOOTH_METAL * way.edges.metal + (1 - SMOOTH_METAL) * way.edges.lossy * tilted
+    if excess is None:
+        # One mirror tilts a level as the next one does: of a reflected path it tells nothing.
+        lossy = way.edges.lossy * (1.0 if only.chain else tilted)
+        odds *= SMOOTH_METAL * way.edges.metal + (1 - SMOOTH_METAL) * lossy
     if excess is not None:
         bounces = len(only.chain)
         first = arrives_first(path, found, room)

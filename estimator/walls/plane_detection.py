@@ -124,7 +124,7 @@ def _best_plane(
     extent = radial * volume[0] + np.sqrt(1 - radial**2) * volume[1] * reach
     slab = 2 * TOLERANCE * float(resolution.cell(centre, normal))
     expected = CLUMPED * len(peaks) * slab / extent
-    chance = poisson_tail(counts[best] - 4, expected) * DRAWS
+    chance = poisson_tail(float(counts[best]) - 4, expected) * DRAWS
     if counts[best] < FEWEST_INLIERS or chance > false_alarm.PLANE:
         return None
     members = near[best]

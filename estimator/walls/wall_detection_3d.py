@@ -303,7 +303,7 @@ def _same(wall: PlaneWall, other: PlaneWall, resolution: Resolution) -> bool:
     """Tell whether most of a wall lies on another, which was followed to its ends."""
     inner = wall.centre + INNER * (wall.corners - wall.centre)
     points = np.concatenate([wall.centre[None], wall.corners, inner])
-    return bool(_onto(points, other, resolution).mean() > MOST)
+    return bool(peaks_on(points, other, resolution).mean() > MOST)
 
 
 def _explained(
@@ -312,13 +312,14 @@ def _explained(
     """Tell which peaks belong to walls that were found, their skirts of sidelobes included."""
     explained = np.zeros(len(peaks), dtype=bool)
     for plane in planes:
-        explained |= _onto(peaks, plane.wall, resolution)
+        explained |= peaks_on(peaks, plane.wall, resolution)
     return explained
 
 
-def _onto(
+def peaks_on(
     points: Float[np.ndarray, "points 3"], wall: PlaneWall, resolution: Resolution
 ) -> Bool[np.ndarray, " points"]:
+    """Tell which points belong to a wall, its skirt of sidelobes included."""
     beside = np.abs((points - wall.centre) @ wall.normal)
     near: np.ndarray = beside < SKIRT * resolution.cell(points, wall.normal)
     margin = SKIRT * resolution.across_ray * float(np.linalg.norm(wall.centre))

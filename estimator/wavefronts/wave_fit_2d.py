@@ -59,6 +59,8 @@ MOST_CONDITION = 1e12
 """Condition number of JᵀJ, its columns scaled, from which two waves are the same: float64 keeps
 four digits of its inverse. [-]"""
 
+UNDETERMINED = "the samples do not tell the wave's parameters apart"
+
 
 @dataclass(frozen=True, kw_only=True)
 class WaveStart:
@@ -339,7 +341,9 @@ def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) 
     try:
         inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
     except np.linalg.LinAlgError as error:  # two or three elements, or frequencies
-        raise NoWaveError("the samples do not tell the wave's parameters apart") from error
+        raise NoWaveError(UNDETERMINED) from error
+    if not np.all(np.diag(inverse) > 0):  # rounding alone told its columns apart
+        raise NoWaveError(UNDETERMINED)
     return inverse
 
 

@@ -310,6 +310,24 @@ def test_the_elements_that_a_wave_reaches_tell_whether_it_came_over_a_walls_end(
     assert (found.status, found.bounces) == ("found", bounces)
 
 
+@pytest.mark.parametrize(("chance", "status"), [(0.3, "ambiguous"), (1e-4, "found")])
+def test_a_wall_that_may_stand_farther_leaves_a_user_over_it_open_and_none_beside_it(
+    dim: Dimension, chance: float, status: str
+) -> None:
+    here = slanted(dim)
+    farther = dim.wall(np.array([-0.14, 0.66, 0.0]) * 1.5, END * 1.5)
+    context = replace(
+        room(here),
+        rooms=((1 - chance, (here,)), (chance, (farther,))),  # type: ignore[arg-type]  # of one kind
+    )
+    over = decided(dim, [reflected(dim, dim.user(1.0, 0.8))], context)
+    assert over.status == status
+    at(over, dim.user(1.0, 0.8))
+    assert len(over.alternatives) == (status == "ambiguous")
+    beside = decided(dim, [direct(dim, dim.user(0.5, 0.3))], context)
+    assert beside.status == "found"
+
+
 def test_well_inside_or_well_beside_a_wall_nothing_is_ambiguous(dim: Dimension) -> None:
     for beyond in (-2e-2, 2e-2):
         near = END + beyond * ALONG
