@@ -179,7 +179,7 @@ def _by_curvature(
         return 0.0
     found = focus_by_range(profiles or range_profiles(echo), aside, fine)
     ratios: np.ndarray = np.log(found.beyond / found.here)
-    spread = float(ratios.std(ddof=1)) / np.sqrt(len(ratios))
+    spread = float(ratios.std(ddof=1) / np.sqrt(len(ratios)))
     return float(ratios.mean()) / max(spread, float(np.finfo(float).tiny))
 
 
