@@ -59,8 +59,6 @@ MOST_CONDITION = 1e12
 """Condition number of JᵀJ, its columns scaled, from which two waves are the same: float64 keeps
 four digits of its inverse. [-]"""
 
-UNDETERMINED = "the samples do not tell the wave's parameters apart"
-
 
 @dataclass(frozen=True, kw_only=True)
 class WaveStart:
@@ -340,10 +338,10 @@ def _inverse(normal: Float[np.ndarray, "all all"], starts: Sequence[WaveStart]) 
         raise NoWaveError("two waves became one")
     try:
         inverse: np.ndarray = np.linalg.inv(scaled) * np.outer(scale, scale)
+        if not np.all(np.diag(inverse) > 0):  # rounding alone told its columns apart
+            raise np.linalg.LinAlgError
     except np.linalg.LinAlgError as error:  # two or three elements, or frequencies
-        raise NoWaveError(UNDETERMINED) from error
-    if not np.all(np.diag(inverse) > 0):  # rounding alone told its columns apart
-        raise NoWaveError(UNDETERMINED)
+        raise NoWaveError("the samples do not tell the wave's parameters apart") from error
     return inverse
 
 
