@@ -38,12 +38,9 @@ class Sweep:
 
 
 def point_profiles(
-    sweep: Sweep,
-    bins: Float[np.ndarray, " bins"],
-    ranges: Float[np.ndarray, "positions points"],
-    rates: Float[np.ndarray, "positions points"],
-) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
-    """Return the profile of each point, and how it changes as the points move.
+    sweep: Sweep, bins: Float[np.ndarray, " bins"], ranges: Float[np.ndarray, "positions points"]
+) -> Complex[np.ndarray, "rows points"]:
+    """Return the profile of each point.
 
     Parameters
     ----------
@@ -53,12 +50,66 @@ def point_profiles(
         Ranges of the profiles: whole multiples of the sweep's bin width. [m]
     ranges
         From each antenna position to each point. [m]
-    rates
-        By how much these grow with what moves the points. [-]
 
     Returns
     -------
-    Profiles [-] and their derivatives [1/m], rows being positions and, within each, bins.
+    Profiles, rows being positions and, within each, bins. [-]
+    """
+    return _tables(ranges, bins, _traced(sweep, bins, ranges, None)[:1])[0]
+
+
+def point_slopes(
+    sweep: Sweep,
+    bins: Float[np.ndarray, " bins"],
+    ranges: Float[np.ndarray, "positions points"],
+    rates: Float[np.ndarray, "positions points"],
+) -> Complex[np.ndarray, "rows points"]:
+    """Return how the profiles of :func:`point_profiles` change as the points move.
+
+    Parameters
+    ----------
+    sweep, bins, ranges
+        As there.
+    rates
+        By how much ranges grow with what moves the points. [-]
+
+    Returns
+    -------
+    Derivatives of the profiles. [1/m]
+    """
+    return _tables(ranges, bins, _traced(sweep, bins, ranges, rates)[1:])[0]
+
+
+def profiles_and_slopes(
+    sweep: Sweep,
+    bins: Float[np.ndarray, " bins"],
+    ranges: Float[np.ndarray, "positions points"],
+    rates: Float[np.ndarray, "positions points"],
+) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
+    """Return both, in one pass: see :func:`point_profiles` and :func:`point_slopes`."""
+    profiles, slopes = _tables(ranges, bins, _traced(sweep, bins, ranges, rates))
+    return profiles, slopes
+
+
+def _tables(
+    ranges: Float[np.ndarray, "positions points"],
+    bins: Float[np.ndarray, " bins"],
+    values: list[Any],
+) -> list[Complex[np.ndarray, "rows points"]]:
+    dr.eval(values)  # together: one kernel
+    shape = len(ranges) * bins.size, ranges.shape[1]
+    return [value.numpy().view(np.complex128).reshape(shape) for value in values]
+
+
+def _traced(
+    sweep: Sweep,
+    bins: Float[np.ndarray, " bins"],
+    ranges: Float[np.ndarray, "positions points"],
+    rates: Float[np.ndarray, "positions points"] | None,
+) -> list[Any]:
+    """Trace the profiles and, if rates are given, their slopes; nothing is evaluated yet.
+
+    Real and imaginary parts are lanes of their own, side by side as numpy holds them.
     """
     arrays = engine.arrays()
     positions, points = ranges.shape
@@ -70,25 +121,21 @@ def point_profiles(
     sign = np.cos(sweep.count * per_range * bins)
     # The sine of a difference from those of both sides: exact to 1e-16, on a bin to 1e-9 of 1.
     at_point, at_bin = np.exp(1j * per_range * ranges), np.exp(1j * per_range * bins)
-    # Real and imaginary parts are lanes of their own, side by side as numpy holds them.
-    of_point = [
-        arrays.Float64(np.repeat(table.astype(np.float64), 2, axis=1).ravel())
-        for table in (at_point.real, at_point.imag, turn.real, turn.imag, rates)
-    ]
-    turned_carrier = 1j * carrier
-    of_point += [
-        arrays.Float64(np.ascontiguousarray(table).view(np.float64).ravel())
-        for table in (carrier, turned_carrier)
-    ]
     of_bin = [arrays.Float64(table) for table in (at_bin.real, at_bin.imag, sign)]
 
     lane = dr.arange(arrays.UInt32, 2 * positions * bins.size * points)
     row, part = row_and_column(lane, 2 * points)
     position, column = row_and_column(row, bins.size)
     entry = position * dr.opaque(arrays.UInt32, 2 * points) + part
-    cosine_p, sine_p, cosine_n, sine_n, rate, along, across = (
-        dr.gather(arrays.Float64, table, entry) for table in of_point
+
+    def of_point(table: Float[np.ndarray, "positions doubled"]) -> Any:
+        return dr.gather(arrays.Float64, arrays.Float64(table.ravel()), entry)
+
+    cosine_p, sine_p, cosine_n, sine_n = (
+        of_point(np.repeat(table, 2, axis=1))
+        for table in (at_point.real, at_point.imag, turn.real, turn.imag)
     )
+    carried = of_point(carrier.view(np.float64))
     cosine_b, sine_b, turned = (dr.gather(arrays.Float64, table, column) for table in of_bin)
 
     def opaque(value: float) -> Any:
@@ -100,13 +147,11 @@ def point_profiles(
     on_bin = abs(sine) < ON_BIN
     inverse = 1 / dr.select(on_bin, 1.0, sine)
     kernel = dr.select(on_bin, count, -turned * sine_n * inverse)
+    profiles = kernel * carried
+    if rates is None:
+        return [profiles]
     falling = (turned * cosine_n * count - kernel * cosine) * inverse * scale
+    rate = of_point(np.repeat(rates.astype(np.float64), 2, axis=1))
     real = dr.select(on_bin, 0.0, -falling) * rate
     imag = -opaque(wavenumber) * kernel * rate
-    profiles, slopes = kernel * along, real * along + imag * across
-    dr.eval(profiles, slopes)
-    shape = positions * bins.size, points
-    return (
-        profiles.numpy().view(np.complex128).reshape(shape),
-        slopes.numpy().view(np.complex128).reshape(shape),
-    )
+    return [profiles, real * carried + imag * of_point((1j * carrier).view(np.float64))]

@@ -113,7 +113,8 @@ def focus_polar(
         refuse_points_out_of_range(focuser.profiles, corners)
         image = _sum_of_parts(focuser, line, grid, error)
     turns = sign * ways * per_metre * grid.ranges
-    return np.asarray(image * np.exp(2j * np.pi * (turns - np.round(turns)))[:, None])
+    image *= np.exp(2j * np.pi * (turns - np.round(turns)))[:, None]
+    return image
 
 
 def _sum_of_parts(
@@ -123,6 +124,7 @@ def _sum_of_parts(
     image = np.empty((grid.ranges.size, grid.sines.size), dtype=np.complex128)
     worth = is_worth_it(focuser.profiles, image.size)
     table: ProfileTable = focuser.fine if worth else focuser.cubic
+    scale = table.scale / focuser.profiles.gain
     everything = np.array([0, len(line.along)])
     first = 0
     while first < grid.ranges.size:
@@ -142,8 +144,8 @@ def _sum_of_parts(
                 sums = own[..., : grid.sines.size]
             else:
                 sums = _interpolated(focuser, table, line, plan, some)
-            image.real[rows], image.imag[rows] = sums
-    image *= table.scale / focuser.profiles.gain
+            for plane, part in ((image.real, sums[0]), (image.imag, sums[1])):
+                np.multiply(part, scale, out=plane[rows], dtype=np.float64)
     return image
 
 

@@ -128,13 +128,13 @@ def _explained(echo: Echo, line: FittedLine, resolution: Resolution) -> float:
     row = line.middle + places[:, None] * line.direction
     profiles = row_profiles(few, start, end)
     data = profiles.values.ravel()
-    echoes = row_echoes(few, profiles, row, line.normal)[0]
+    echoes = row_echoes(few, profiles, row)
     left = data - echoes @ cho_solve(factorized(echoes), adjoint(echoes, data))
     count = max(1, round(2 * float(np.linalg.norm(half)) / cell))
     along = ((np.arange(count) + 0.5) / count - 0.5) * 2 * float(np.linalg.norm(half))
     across = ASIDE * float(resolution.cell(line.middle, line.normal))
     cells = trial_points(start, end, along, np.zeros(1), across)[0].reshape(-1, 3)
-    focused = row_echoes(few, profiles, cells, line.normal)[0]
+    focused = row_echoes(few, profiles, cells)
     shares = []
     for taper in (np.ones(len(few.positions)), aperture_taper(few.positions, SURVEY_TAPER)):
         seen, unexplained = (

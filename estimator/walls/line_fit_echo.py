@@ -38,6 +38,7 @@ from estimator.walls.scatterer_row import (
     adjoint,
     factorized,
     row_echoes,
+    row_echoes_and_slopes,
     row_places,
     row_profiles,
     thinned,
@@ -113,13 +114,15 @@ def fit_coherently(
     profiles = row_profiles(few, start, end)
     beside = None
     if others is not None and len(others):
-        beside = row_echoes(few, profiles, others, unit_normal(start, end))[0]
+        beside = row_echoes(few, profiles, others)
     data = profiles.values.ravel()
     first = (start, end)
-    for _ in range(STEPS):
+    for number in range(STEPS):
+        if number:
+            del echoes, slopes, solved  # their memory, hundreds of megabytes, serves the next ones
         along = (end - start) / length
         row = 0.5 * (start + end) + places[:, None] * along
-        echoes, slopes = row_echoes(few, profiles, row, unit_normal(start, end))
+        echoes, slopes = row_echoes_and_slopes(few, profiles, row, unit_normal(start, end))
         if beside is not None:
             echoes = np.concatenate([echoes, beside], axis=1)
         solved = factorized(echoes)

@@ -22,7 +22,7 @@ from scipy.linalg import cho_solve
 from estimator.geometry.lateness import Lateness
 from estimator.measurement.model import Echo
 from estimator.walls.cluster_robust_covariance import sandwich
-from estimator.walls.scatterer_row import RowProfiles, adjoint, row_echoes_by
+from estimator.walls.scatterer_row import RowProfiles, adjoint, row_slopes
 
 STEP_ERROR = 0.1
 """Error of the one step over its length: delays of 0.1 ns, 2 rad at the ends of an aperture of
@@ -68,7 +68,7 @@ def focus_shift(
     part
         Length over which the errors of places are correlated. [m]
     """
-    own = row_echoes_by(echo, profiles, row, _delay_rates(echo, row))[1]
+    own = row_slopes(echo, profiles, row, _delay_rates(echo, row))
     delayed = own @ strengths
     delayed = delayed - echoes @ cho_solve(solved, adjoint(echoes, delayed))
     columns = np.concatenate([moved, delayed[:, None]], axis=1)

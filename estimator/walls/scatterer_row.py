@@ -8,7 +8,12 @@ from scipy.constants import speed_of_light
 from scipy.linalg import cho_factor
 from scipy.linalg.blas import zherk
 
-from estimator.imaging.dirichlet_kernel import Sweep, point_profiles
+from estimator.imaging.dirichlet_kernel import (
+    Sweep,
+    point_profiles,
+    point_slopes,
+    profiles_and_slopes,
+)
 from estimator.measurement.model import Echo, frequency_step
 
 OVERSAMPLING = 1.2
@@ -171,23 +176,31 @@ def row_profiles(
 
 
 def row_echoes(
+    echo: Echo, profiles: RowProfiles, points: Float[np.ndarray, "points 3"]
+) -> Complex[np.ndarray, "rows points"]:
+    """Return each scatterer's range profiles."""
+    return point_profiles(sweep_of(echo), profiles.ranges, ranges_to(echo, points))
+
+
+def row_echoes_and_slopes(
     echo: Echo,
     profiles: RowProfiles,
     points: Float[np.ndarray, "points 3"],
     normal: Float[np.ndarray, " 3"],
 ) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
     """Return each scatterer's range profiles, and how they change along a normal [1/m]."""
-    return row_echoes_by(echo, profiles, points, _range_slopes(echo, points, normal))
+    rates = _range_slopes(echo, points, normal)
+    return profiles_and_slopes(sweep_of(echo), profiles.ranges, ranges_to(echo, points), rates)
 
 
-def row_echoes_by(
+def row_slopes(
     echo: Echo,
     profiles: RowProfiles,
     points: Float[np.ndarray, "points 3"],
     rates: Float[np.ndarray, "positions points"],
-) -> tuple[Complex[np.ndarray, "rows points"], Complex[np.ndarray, "rows points"]]:
-    """Return each scatterer's range profiles, and how they change at rates of their ranges."""
-    return point_profiles(sweep_of(echo), profiles.ranges, ranges_to(echo, points), rates)
+) -> Complex[np.ndarray, "rows points"]:
+    """Return how each scatterer's range profiles change at rates of its ranges. [1/m]."""
+    return point_slopes(sweep_of(echo), profiles.ranges, ranges_to(echo, points), rates)
 
 
 def adjoint(

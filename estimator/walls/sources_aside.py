@@ -200,7 +200,7 @@ def _source_echo(
     patch = patch[np.abs(patch[:, 0]) > imaged_sine(echo) * np.linalg.norm(patch, axis=-1)]
     ends = place + beside[[0, -1], None] * across
     profiles = row_profiles(echo, ends[0], ends[1])
-    echoes = row_echoes(echo, profiles, patch, ray)[0]
+    echoes = row_echoes(echo, profiles, patch)
     strengths = cho_solve(factorized(echoes), adjoint(echoes, profiles.values.ravel()))
     return _echo_of(echo, patch, strengths)
 

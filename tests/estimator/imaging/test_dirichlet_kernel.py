@@ -5,7 +5,12 @@ import pytest
 from jaxtyping import Complex, Float
 from scipy.constants import speed_of_light
 
-from estimator.imaging.dirichlet_kernel import Sweep, point_profiles
+from estimator.imaging.dirichlet_kernel import (
+    Sweep,
+    point_profiles,
+    point_slopes,
+    profiles_and_slopes,
+)
 
 SWEEP = Sweep(centre=275e9, step=20e6, count=401)
 BINS = np.arange(220, 260) * SWEEP.bin_width
@@ -25,7 +30,9 @@ def test_profiles_and_slopes_are_those_of_the_sum(where: str) -> None:
     if where == "on bins":
         ranges = BINS[rng.integers(5, BINS.size - 5, ranges.shape)]
     rates = rng.uniform(-1, 1, ranges.shape)
-    profiles, slopes = point_profiles(SWEEP, BINS, ranges, rates)
+    profiles, slopes = profiles_and_slopes(SWEEP, BINS, ranges, rates)
+    np.testing.assert_array_equal(profiles, point_profiles(SWEEP, BINS, ranges))
+    np.testing.assert_array_equal(slopes, point_slopes(SWEEP, BINS, ranges, rates))
     # Rounding: phases of a few thousand turns in double precision, summed over the sweep.
     np.testing.assert_allclose(profiles, summed(ranges), atol=1e-10 * np.sqrt(SWEEP.count))
     step = 1e-8  # of what moves the points; the carrier turns by 1e-4 [m]
