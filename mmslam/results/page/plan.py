@@ -15,6 +15,7 @@ from estimator.prediction.wall_reflection import (
     wall_reflections,
 )
 from estimator.results.estimate import Estimate, Image, Mirror, Target, UserEstimate
+from mmslam.results.document import plain
 from mmslam.results.page.level_codes import coded_levels
 from validation.figures import views
 from validation.metrics.truth import Truth
@@ -28,8 +29,11 @@ MOST_PIXELS = 640
 MOST_VOXELS = 96
 """Along one side of a volume. [-]"""
 
-MOST_POSITIONS = 200
-"""Of the array that are drawn, evenly chosen. [-]"""
+MOST_POSITIONS = 4096
+"""Of the array that are drawn; of more, evenly chosen ones. [-]"""
+
+DIGITS = 6
+"""Of drawn coordinates in metres: a micrometre. [-]"""
 
 MOST_BOUNCES = 3
 """Of the chains that a dragged user is predicted over. [-]"""
@@ -61,14 +65,13 @@ def plan_document(
         2 for a linear array, 3 for a planar one.
     """
     positions = measurement.places
-    chosen = positions[:: -(-len(positions) // MOST_POSITIONS)]
     view = _view(estimate, truth, positions)
-    return {
+    document = {
         "dimensions": dimensions,
         "view": {"x": [view.left, view.right], "y": [view.bottom, view.top]},
         "images": _images(estimate, view),
         "volumes": _volumes(estimate),
-        "array": chosen.tolist(),
+        "array": drawn_positions(positions),
         "mirrors": [
             mirror_document(index, mirror) for index, mirror in enumerate(estimate.mirrors)
         ],
@@ -88,6 +91,7 @@ def plan_document(
         "assumed_db": ASSUMED_DB,
         "assumed_deviation_db": ASSUMED_DEVIATION_DB,
     }
+    return plain(document)
 
 
 def prediction_document(
@@ -105,7 +109,7 @@ def prediction_document(
     The document; None where no frame of a linear or planar array, or no frequency, is known.
     """
     measured = measurement.echo or next(iter(measurement.uplinks), None)
-    frame = _frame(measurement, dimensions)
+    frame = None if measured is None else _frame(measurement, dimensions)
     if measured is None or frame is None:
         return None
     mirrors = estimate.mirrors
@@ -141,6 +145,19 @@ def mirror_document(index: int, mirror: Mirror) -> dict[str, Any]:
         "offset_deviation_m": float(np.sqrt(max(mirror.covariance[-1, -1], 0.0))),
         "seen_through": list(mirror.seen_through),
     }
+
+
+def drawn_positions(positions: Float[np.ndarray, "positions 3"]) -> list[list[float]]:
+    """Return the array's positions, at most :data:`MOST_POSITIONS` of them. [m].
+
+    Parameters
+    ----------
+    positions
+        Phase centres. [m]
+    """
+    chosen = positions[:: -(-len(positions) // MOST_POSITIONS)]
+    listed: list[list[float]] = np.round(chosen, DIGITS).tolist()
+    return listed
 
 
 def ellipse(

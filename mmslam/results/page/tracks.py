@@ -9,7 +9,7 @@ from jaxtyping import Float
 from estimator.results.estimate import Mirror
 from estimator.tracking.multi_hypothesis import TrackPoint
 from mmslam.moving_users import MovingUser
-from mmslam.results.page.plan import mirror_document
+from mmslam.results.page.plan import drawn_positions, mirror_document
 from validation.figures import views
 from validation.metrics.errors import position_error
 
@@ -18,9 +18,6 @@ SCRIPTS_TRACK = ("plan.js", "track.js")
 
 MOST_TIMES = 2000
 """Times that the page holds, evenly chosen: one for each pixel of the slider. [-]"""
-
-MOST_POSITIONS = 200
-"""Of the array that are drawn, evenly chosen. [-]"""
 
 _REGION = 5.99  # χ² of two coordinates that holds 95 %
 
@@ -54,7 +51,7 @@ def tracks_document(
         "title": ", ".join(user.name for user in users) or "nobody",
         "dimensions": 3 if any(mirror.corners is not None for mirror in mirrors) else 2,
         "view": {"x": [view.left, view.right], "y": [view.bottom, view.top]},
-        "array": positions[:: -(-len(positions) // MOST_POSITIONS)].tolist(),
+        "array": drawn_positions(positions),
         "mirrors": [mirror_document(index, mirror) for index, mirror in enumerate(mirrors)],
         "times": [times[index] for index in kept],
         "left_out": len(times) - len(kept),

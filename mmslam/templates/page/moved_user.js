@@ -44,7 +44,7 @@ function movedUser(plot, layout, isOn) {
     const rays = paths.map((path) => ({
       type: "path", layer: "above",
       path: path.vertices.map((p, i) => `${i ? "L" : "M"}${p[0]},${p[1]}`).join(""),
-      line: { color: colour, width: 2.2 },
+      line: { color: colour, width: 2.2, dash: "dash" },
       opacity: Math.max(0.25, 1 + (path.level_db - strongest) / 40),
     }));
     return [...rays, {

@@ -24,10 +24,12 @@ function plainText(text) {
   return String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 }
 
-const metres = (value, digits = 4) => `${value.toFixed(digits)} m`;
-const millimetres = (value) => `${(1e3 * value).toPrecision(3)} mm`;
+// Numbers for people; what is not known is a dash, and there is no minus zero.
+const fixed = (value, digits) => (value === null ? "—" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1"));
+const metres = (value, digits = 4) => `${fixed(value, digits)} m`;
+const millimetres = (value) => (value === null ? "—" : `${(1e3 * value).toPrecision(3)} mm`);
 const placeText = (p, n = page.dimensions) =>
-  `(${p.slice(0, n).map((x) => x.toFixed(4)).join(", ")}) m`;
+  `(${p.slice(0, n).map((x) => fixed(x, 4)).join(", ")}) m`;
 const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Bytes, the first axis fastest; see mmslam/results/page/level_codes.py.

@@ -22,7 +22,7 @@ function mirrorText(mirror) {
   const seen = mirror.seen_through.length ? `<br>seen through ${mirror.seen_through.join(", ")}` : "";
   const level = mirror.level_db === null ? "" : `<br>${mirror.level_db.toFixed(1)} dB over the background`;
   return `${plainText(mirror.name)}${level}<br>offset ± ${millimetres(mirror.offset_deviation_m)}` +
-    `<br>confidence ${mirror.confidence.toFixed(3)}${seen}`;
+    `<br>confidence ${fixed(mirror.confidence, 3)}${seen}`;
 }
 
 function targetText(target) {

@@ -26,11 +26,14 @@ async function drawSlices() {
   const which = document.getElementById("slice-volume");
   const along = document.getElementById("slice-axis");
   const at = document.getElementById("slice-at");
+  const deepest = document.getElementById("plan-floor"); // of all images
   if (!Object.keys(volumes).length) {
     document.getElementById("slices").hidden = true;
     return;
   }
   for (const name of Object.keys(volumes)) which.append(new Option(`${name} image`, name));
+  const { axes } = Object.values(volumes)[0]; // first across the thinnest side: the most is seen
+  along.value = ["x", "y", "z"].reduce((a, b) => (axes[b].length < axes[a].length ? b : a));
 
   const slice = () => {
     const volume = volumes[which.value];
@@ -48,7 +51,7 @@ async function drawSlices() {
     const { volume, axis, right, up, across, upward, z, value } = slice();
     document.getElementById("slice-text").textContent = `${axis} = ${metres(value)}`;
     const data = [{
-      type: "heatmap", x: across, y: upward, z, zmin: volume.floor, zmax: 0, zsmooth: "fast",
+      type: "heatmap", x: across, y: upward, z, zmin: Number(deepest.value), zmax: 0, zsmooth: "fast",
       colorscale: MAGMA, colorbar: levelBar(), hoverongaps: false,
       hovertemplate: `${right} %{x:.4f} m<br>${up} %{y:.4f} m<br>%{z:.1f} dB below the peak<extra></extra>`,
     }];
@@ -75,7 +78,7 @@ async function drawSlices() {
     return draw();
   };
   for (const choice of [which, along]) choice.addEventListener("change", brightest);
-  at.addEventListener("input", draw);
+  for (const slider of [at, deepest]) slider.addEventListener("input", draw);
   await brightest();
   for (const query of [darkTheme, narrow]) query.addEventListener("change", draw);
   plot.dataset.drawn = "yes";

@@ -295,6 +295,7 @@ def test_a_volume_is_sliced_along_each_axis_and_shown_in_space(
         assert page.evaluate(peak) == 0
         page.locator("#slice-at").fill("0")
         assert page.evaluate(peak) == pytest.approx(-60.0)
+        assert page.evaluate("document.getElementById('slice-plot').data[0].zmin") == -40
     assert page.evaluate("document.querySelectorAll('#space-plot canvas').length") > 0
     kinds = page.evaluate("document.getElementById('space-plot').data.map(t => t.type)")
     assert {"mesh3d", "scatter3d"} == set(kinds)

@@ -15,6 +15,7 @@ from estimator.geometry.specular_chains import image_over
 from estimator.geometry.wall_2d import Wall
 from estimator.geometry.wall_3d import PlaneWall
 from estimator.measurement.model import Measurement
+from estimator.measurement.path_list import PathList
 from estimator.prediction.channel_2d import predict_channel, predict_user_channel
 from estimator.results.estimate import Estimate, Mirror, Target, UserEstimate
 from mmslam.results.page.plan import prediction_document
@@ -231,6 +232,21 @@ def test_a_result_without_a_frame_offers_no_prediction(
     assert measurement.echo is not None
     around = replace(measurement, echo=replace(measurement.echo, positions=places), uplinks=())
     assert prediction_document(around, estimate, dimensions=2) is None
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_lists_of_paths_have_no_frequency_to_predict_at(
+    measurement: Measurement, estimate: Estimate, dimensions: int
+) -> None:
+    heard = PathList(
+        user="ann",
+        azimuth=np.array([1.2]),
+        delay=np.array([5e-9]),
+        angle_deviation=0.01,
+        delay_deviation=1e-11,
+    )
+    lists = replace(measurement, echo=None, uplinks=(), path_lists=(heard,))
+    assert prediction_document(lists, estimate, dimensions=dimensions) is None
 
 
 def test_as_many_bounces_are_followed_as_the_answer_has(
