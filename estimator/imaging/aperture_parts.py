@@ -153,18 +153,24 @@ def _steps(
     centres: Float[np.ndarray, " parts"],
 ) -> Float[np.ndarray, " parts"]:
     """Return the step of the sines that sample each part's image."""
-    ranges = grid.ranges[[0, -1], None]
+    ranges = grid.ranges[[0, -1]]
     sines = np.linspace(grid.sines[0], grid.sines[-1], PROBES)
-
-    def slopes(places: Float[np.ndarray, " parts"]) -> Float[np.ndarray, "parts 2 probes"]:
-        place = places[:, None, None]
-        length = np.sqrt(np.maximum(ranges**2 - 2 * ranges * sines * place + place**2, FLAT**2))
-        return np.asarray(-ranges * place / length)
-
-    own = line.wavenumbers[1] * slopes(centres)
-    ends = line.along[edges[:-1]], line.along[edges[1:] - 1]
-    beside = [k * slopes(end) - own for k in line.wavenumbers[[0, 2]] for end in ends]
+    own = line.wavenumbers[1] * _slopes(ranges, sines, centres)
+    ends = (line.along[edges[:-1]], line.along[edges[1:] - 1])
+    at_ends = [_slopes(ranges, sines, end) for end in ends]
+    beside = [k * slopes - own for k in line.wavenumbers[[0, 2]] for slopes in at_ends]
     return np.asarray(np.pi / (np.abs(beside).max(axis=(0, 2, 3)) * OVERSAMPLING))
+
+
+def _slopes(
+    ranges: Float[np.ndarray, " ranges"],
+    sines: Float[np.ndarray, " probes"],
+    places: Float[np.ndarray, " parts"],
+) -> Float[np.ndarray, "parts ranges probes"]:
+    """Return how lengths from places along the line change with the sine. [m]."""
+    reach, place = ranges[:, None], places[:, None, None]
+    length = np.sqrt(np.maximum(reach**2 - 2 * reach * sines * place + place**2, FLAT**2))
+    return np.asarray(-reach * place / length)
 
 
 def _is_readable(focuser: Focuser, line: Line, grid: PolarGrid, plan: Plan) -> bool:

@@ -128,7 +128,7 @@ def _traced(
     position, column = row_and_column(row, bins.size)
     entry = position * dr.opaque(arrays.UInt32, 2 * points) + part
 
-    def of_point(table: Float[np.ndarray, "positions doubled"]) -> Any:
+    def of_point(table: np.ndarray) -> Any:
         return dr.gather(arrays.Float64, arrays.Float64(table.ravel()), entry)
 
     cosine_p, sine_p, cosine_n, sine_n = (

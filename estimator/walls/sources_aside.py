@@ -17,7 +17,6 @@ References
 """
 
 from dataclasses import dataclass, field, replace
-from itertools import accumulate
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -218,8 +217,18 @@ def _echo_of(
     scale = -4j * np.pi / speed_of_light
     step = np.exp(scale * sweep.step * ranges)
     first = strengths * np.exp(scale * float(echo.frequencies[0]) * ranges)
-    near = np.stack(list(accumulate([step] * (fine - 1), np.multiply, initial=np.ones_like(step))))
-    leap = near[-1] * step
-    far = np.stack(list(accumulate([leap] * (coarse - 1), np.multiply, initial=first)))
+    near = _powers(np.ones_like(step), step, fine)
+    far = _powers(first, near[-1] * step, coarse)
     spectra = np.matmul(far.transpose(1, 0, 2), near.transpose(1, 2, 0))
     return np.asarray(spectra.reshape(len(ranges), -1)[:, : sweep.count])
+
+
+def _powers(
+    first: Complex[np.ndarray, "*n"], factor: Complex[np.ndarray, "*n"], count: int
+) -> Complex[np.ndarray, "count *n"]:
+    """Return a first value times the powers of a factor, from 0 on."""
+    powers = np.empty((count, *first.shape), dtype=np.complex128)
+    powers[0] = first
+    for number in range(1, count):
+        np.multiply(powers[number - 1], factor, out=powers[number])
+    return powers
