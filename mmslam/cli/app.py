@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from mmslam.cli import about, batch, data, room
+from mmslam.cli import about, batch, benchmarking, data, room
 from mmslam.cli.overriding_command import OverridingCommand
 
 app = typer.Typer(
@@ -56,6 +56,7 @@ app.command(name="import")(data.import_)
 app.command()(data.export)
 app.command()(batch.dataset)
 app.command()(batch.sweep)
+app.command()(benchmarking.benchmark)
 app.command()(about.validate)
 app.command()(about.design)
 app.command()(about.info)
