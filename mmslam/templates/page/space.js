@@ -50,6 +50,7 @@ async function drawSpace(plot, box, things) {
   await redraw();
   darkTheme.addEventListener("change", redraw);
   plot.dataset.drawn = "yes";
+  return redraw;
 }
 
 // Triangles of a convex polygon of n corners.
@@ -77,4 +78,23 @@ function thingsFound() {
   add("truth", "truth", "points", truth.targets.map((one) => one.position), named(truth.targets), { symbol: "diamond-open", size: 6 });
   add("array", "array", "points", page.array, "array", { size: 2 });
   return things;
+}
+
+// In space as in the plan: the paths of the user that is moved there.
+async function drawFound() {
+  const rays = { layer: "predicted paths", role: "predicted", kind: "line", points: [], text: "predicted", dash: "dash" };
+  const things = page.prediction ? [...thingsFound(), rays] : thingsFound();
+  let [redraw, drawing, stale] = [null, false, false];
+  document.getElementById("plan-plot").addEventListener("moveduser", async (event) => {
+    rays.points = event.detail.paths.flatMap((path) => [...path.vertices, [null, null, null]]);
+    stale = true;
+    if (!redraw || drawing) return;
+    drawing = true; // one at a time, however fast it is dragged, and the last one surely
+    while (stale) {
+      stale = false;
+      await redraw();
+    }
+    drawing = false;
+  });
+  redraw = await drawSpace(document.getElementById("space-plot"), document.getElementById("space-layers"), things);
 }

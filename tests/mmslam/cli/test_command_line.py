@@ -52,7 +52,8 @@ def test_what_simulates_nothing_loads_neither_the_ray_tracer_nor_matplotlib() ->
     program = (
         "import sys\n"
         "from mmslam.cli import app\n"
-        "heavy = {'drjit', 'mitsuba', 'sionna', 'simulator', 'matplotlib', 'dask', 'zarr'}\n"
+        "heavy = {'drjit', 'mitsuba', 'sionna', 'simulator', 'matplotlib', 'plotly'}\n"
+        "heavy |= {'dask', 'zarr'}\n"
         "for arguments in (['--help'], ['scenes'], ['scenes', 'slam_2d']):\n"
         "    try:\n"
         "        app(arguments)\n"

@@ -302,6 +302,11 @@ def test_a_volume_is_sliced_along_each_axis_and_shown_in_space(
     assert page.locator("#moved-height").is_visible()
     page.mouse.click(*at(page, 0.3, 0.4))
     until(page, "document.getElementById('moved-place').textContent.includes('(0.30')")
+    # The direct path, from the array to the user, also in space.
+    rays = "document.getElementById('space-plot').data.at(-1)"
+    until(page, f"{rays}.x.length > 1")
+    assert page.evaluate(f"[{rays}.x[0], {rays}.y[0]]") == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert page.evaluate(f"[{rays}.x[1], {rays}.y[1]]") == pytest.approx([0.3, 0.4], abs=0.01)
 
 
 def test_a_room_is_turned_in_space_and_its_layers_are_switched(opened: Opened) -> None:
