@@ -32,7 +32,7 @@ def read(path: Path, samples: int) -> Float[np.ndarray, "samples 2"]:
         absent = table["found"].to_numpy() == 0
         table.loc[absent, list(COLUMNS)] = 0.0  # whatever stands there
     refuse_wild(path, table, COLUMNS)
-    places: np.ndarray = table[list(COLUMNS)].to_numpy(dtype=np.float64)
+    places: np.ndarray = table[list(COLUMNS)].to_numpy(dtype=np.float64, copy=True)
     places[absent] = np.nan
     return places
 
