@@ -13,11 +13,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import TypeVar
 
 import mmslam
+from mmslam.results.estimate import Estimate
 
 REPEATS = 5
 
@@ -42,6 +44,11 @@ def _of_process(arguments: list[str]) -> Times:
     return used, time.perf_counter() - begin
 
 
+def _shown(estimate: Estimate) -> None:
+    """Have the images and the close-ups formed."""
+    _ = estimate.raw_image, estimate.close_ups
+
+
 def main() -> None:
     """Measure one scenario, and print a table."""
     name = sys.argv[1] if len(sys.argv) > 1 else "slam_2d"
@@ -56,7 +63,7 @@ def main() -> None:
         for stage, seconds in estimate.timings.items():
             stages.setdefault(stage, []).append(seconds / times[1])
         whole = mmslam.locate(measurement)
-        images.append(_taken(lambda shown=whole: (shown.raw_image, shown.close_ups))[1])
+        images.append(_taken(partial(_shown, whole))[1])
     rows["further estimate"] = _medians(again)
     rows["images and close-ups"] = _medians(images)
     with tempfile.TemporaryDirectory() as folder:

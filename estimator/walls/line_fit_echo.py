@@ -117,9 +117,7 @@ def fit_coherently(
         beside = row_echoes(few, profiles, others)
     data = profiles.values.ravel()
     first = (start, end)
-    for number in range(STEPS):
-        if number:
-            del echoes, slopes, solved  # their memory, hundreds of megabytes, serves the next ones
+    for _ in range(STEPS):
         along = (end - start) / length
         row = 0.5 * (start + end) + places[:, None] * along
         echoes, slopes = row_echoes_and_slopes(few, profiles, row, unit_normal(start, end))
