@@ -109,7 +109,10 @@ def _decided(
     total = float((weights * (1 + np.array(odds))).sum())
     places = _places(consistent, weights / total, found.how)
     best, probability = places[0]
-    answer = replace(placed(name, consistent[best], found, room, chains), probability=probability)
+    answer = placed(name, consistent[best], found, room, chains)
+    assert answer.covariance is not None
+    spread = _spread(consistent, weights, best, found.how)
+    answer = replace(answer, covariance=answer.covariance + spread, probability=probability)
     if probability >= CERTAIN:
         return answer
     others = [
@@ -172,6 +175,24 @@ def _places(
         else:
             places.append((int(index), float(shares[index])))
     return sorted(places, key=lambda place: -place[1])
+
+
+def _spread(
+    consistent: Sequence[Consensus], weights: Float[np.ndarray, " weights"], best: int, how: Bearing
+) -> Float[np.ndarray, "3 3"]:
+    """Return how far explanations of one place lie apart, weighted, as a covariance. [m²].
+
+    Two waves that describe one front, bent by roughness, end at places that neither's covariance
+    tells the distance of.
+    """
+    alike = [
+        index
+        for index, one in enumerate(consistent)
+        if index == best or same_place(consistent[best], one, how)
+    ]
+    away = np.array([consistent[index].position - consistent[best].position for index in alike])
+    shares = weights[alike] / weights[alike].sum()
+    return np.asarray(np.einsum("p,px,py->xy", shares, away, away))
 
 
 def _ordered(chances: Mapping[Chain, float]) -> tuple[Chain, ...]:

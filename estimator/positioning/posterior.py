@@ -167,19 +167,23 @@ def log_weight(
             blocked = BLOCKED
             if chain and first:
                 blocked = chance_of_blockage(consensus.position, room, found.how)
-            tilted = tilt_ratio(path, found, way="reflected", over="direct")
+            tilted = tilt_ratio(path, found, room, way="reflected", over="direct")
             weight = level_density(excess, len(chain), first=first, blocked=blocked, tilted=tilted)
             total += np.log(weight)
     for index in chains:
         if index in used:
             continue
         path = found.paths[index]
-        if any(
-            beside(path, found.paths[other], room)
-            and path.share < LARGER_PART * found.paths[other].share
+        whole = [
+            found.paths[other].share
             for other in used
-        ):
-            continue  # a part of a wave that is explained
+            if beside(path, found.paths[other], room)
+            and path.share < LARGER_PART * found.paths[other].share
+        ]
+        if whole:
+            # A part of a wave that is explained: the larger part is likelier to be where it is.
+            total += np.log(max(whole) / (max(whole) + path.share))
+            continue
         total += np.log(_unexplained(path.share / strongest) / _directions(found, path))
         if straight is not None and path.wave.path_length < straight - early:
             total += np.log(EARLIER)
@@ -195,8 +199,8 @@ def level_of(path: Path, found: PathSet, room: MapContext) -> float | None:
     A wavefront distorted by roughness may have been fitted by two waves: then the level is that of
     all the pilot's power that the other paths do not hold.
     """
-    parts = [other for other in found.paths if other is not path and beside(path, other, room)]
-    if not any(other.share > PART * path.share for other in parts):
+    parts = _parts(path, found, room)
+    if not parts:
         return path_excess_db(path, found.frequency)
     if found.frequency is None or found.power is None:
         return None
@@ -209,9 +213,20 @@ def level_of(path: Path, found: PathSet, room: MapContext) -> float | None:
     return told_excess_db(excess_db(amplitude, path.wave.path_length, found.frequency))
 
 
-def tilt_ratio(path: Path, found: PathSet, *, way: Way, over: Way) -> float:
-    """Return how much likelier a path's tilt is for one way than for another; 1 if unknown. [-]."""
+def _parts(path: Path, found: PathSet, room: MapContext) -> list[Path]:
+    """Return the other parts of a path's wave, none if all of them are small."""
+    parts = [other for other in found.paths if other is not path and beside(path, other, room)]
+    return parts if any(other.share > PART * path.share for other in parts) else []
+
+
+def tilt_ratio(path: Path, found: PathSet, room: MapContext, *, way: Way, over: Way) -> float:
+    """Return how much likelier a path's tilt is for one way than for another; 1 if unknown. [-].
+
+    One part of a wave that roughness bends has a tilt of its own, which tells nothing.
+    """
     if path.tilt_db is None or found.bandwidth is None or found.frequency is None:
+        return 1.0
+    if _parts(path, found, room):
         return 1.0
     return by_tilt(path.tilt_db, found.frequency, found.bandwidth, way=way, over=over)
 
@@ -261,7 +276,7 @@ def unseen_odds(
         odds = CLEAR_UNSEEN
     else:
         odds = UNSEEN / (1 - UNSEEN) * WITH_A_MIRROR[way.sight]
-    tilted = tilt_ratio(path, found, way="reflected", over="direct")
+    tilted = tilt_ratio(path, found, room, way="reflected", over="direct")
     if excess is None:
         # One mirror tilts a level as the next one does: of a reflected path it tells nothing.
         lossy = way.edges.lossy * (1.0 if only.chain else tilted)

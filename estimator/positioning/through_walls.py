@@ -59,7 +59,7 @@ def through_odds(explanation: Consensus, found: PathSet, room: MapContext, sight
     (only,) = explanation.sightings
     path, bounces = found.paths[only.path], len(only.chain)
     excess = level_of(path, found, room)
-    tilted = tilt_ratio(path, found, way="through", over="reflected" if bounces else "direct")
+    tilted = tilt_ratio(path, found, room, way="through", over="reflected" if bounces else "direct")
     prior = 1.0 if bounces else WITH_A_MIRROR[sight]
     if excess is None or found.frequency is None:
         return prior * LEVEL_UNKNOWN * tilted

@@ -265,6 +265,35 @@ def test_a_longer_path_from_where_the_image_shows_nothing_contradicts_nothing(
     assert decided(dim, nearer, replace(room(), widest=0.3)).status == "ambiguous"
 
 
+def test_of_two_waves_that_describe_one_bent_front_the_stronger_is_the_user(
+    dim: Dimension,
+) -> None:
+    user = dim.user(1.0, 0.8)
+    image = image_of(user)
+    # A deviation beside it: parts of one front err by as much as they are apart.
+    beside = image + np.array([4e-3, 0.0, 0.0])
+    size = len(dim.how.coordinates) - 1
+
+    def bent(place: Place, share: float) -> Path:
+        one = direct(dim, place, share=share)
+        loose = np.diag([(4e-3) ** 2] * size + [LENGTH**2])
+        changed = replace(one.wave, covariance=loose)  # type: ignore[type-var]
+        return replace(one, wave=changed, tilt_db=-1.2 if share < 0.5 else 0.1)
+
+    for shares, place in (((0.55, 0.41), image), ((0.41, 0.55), beside)):
+        both = [bent(image, shares[0]), bent(beside, shares[1])]
+        paths = replace(together(dim, both), bandwidth=7e9, frequency=60e9)
+        found = decide("ann", paths, room(slanted(dim)))
+        at(found, image_of(place), 1e-6)
+        alone = decide("ann", together(dim, [bent(place, 0.9)]), room(slanted(dim)))
+        assert found.covariance is not None
+        assert alone.covariance is not None
+        away = image_of(beside) - user
+        # The other part has 0.41/0.96 of the probability.
+        more = away @ (found.covariance - alone.covariance) @ away / (away @ away)
+        assert more == pytest.approx(0.43 * away @ away, rel=0.05)
+
+
 def test_a_much_weaker_path_elsewhere_does_not_make_it_ambiguous(dim: Dimension) -> None:
     one, other = dim.user(0.3, 0.4), dim.user(-0.2, 0.5)
     two = [direct(dim, one, share=0.8), direct(dim, other, share=0.1)]
