@@ -130,7 +130,7 @@ def _strongest(profiles: RangeProfiles, nearest: float) -> Float[np.ndarray, " l
     """
     channels = len(profiles.coefficients)
     half = max(1, round(0.5 * MIDDLE * channels))
-    middle = profiles.coefficients[channels // 2 - half : channels // 2 + half + 1, :, 3]
+    middle = profiles.coefficients[channels // 2 - half : channels // 2 + half + 1, :, 0]
     energy = (np.abs(middle) ** 2).sum(axis=0).astype(float)
     cells = energy.size
     away = np.arange(cells) * profiles.cell

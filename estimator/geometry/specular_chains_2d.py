@@ -39,14 +39,22 @@ def _continued(
         if chain and chain[-1] == index:
             continue
         image = image_over(np.stack([wall.start, wall.end]), walls, chain)
-        ends = np.arctan2(image[:, 1], image[:, 0])
-        if np.ptp(ends) > np.pi:  # across the negative x axis, behind the array
-            continue
-        narrower = max(cone[0], float(ends.min())), min(cone[1], float(ends.max()))
+        low, high = _directions(image)
+        narrower = max(cone[0], low), min(cone[1], high)
         if narrower[0] >= narrower[1] or _nearest(image) > reach:
             continue
         if not chain or _behind(image, walls, chain):
             yield from _continued(walls, (*chain, index), narrower, deepest, reach)
+
+
+def _directions(image: Float[np.ndarray, "2 3"]) -> tuple[float, float]:
+    """Return the angles between which the array, at the origin, sees a segment. [rad].
+
+    Of one that crosses the negative x axis it is the part before the array, y > 0.
+    """
+    ends = np.arctan2(image[:, 1], image[:, 0])
+    low, high = float(ends.min()), float(ends.max())
+    return (high, np.pi) if high - low > np.pi else (low, high)
 
 
 def _behind(image: Float[np.ndarray, "2 3"], walls: Sequence[Wall], chain: Chain) -> bool:

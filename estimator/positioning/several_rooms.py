@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
 
+from estimator.compute.distributions import chi_square_quantile
 from estimator.positioning.hypotheses import SAME
 from estimator.positioning.position_report import ambiguous
 from estimator.positioning.posterior import CERTAIN
@@ -89,4 +89,4 @@ def _same(one: UserEstimate, other: UserEstimate, axes: Sequence[int]) -> bool:
         return False
     spread = (one.covariance + other.covariance)[np.ix_(list(axes), list(axes))]
     square = between @ np.linalg.solve(spread, between)
-    return bool(square < chi2.ppf(SAME, df=len(axes)))
+    return bool(square < chi_square_quantile(SAME, len(axes)))

@@ -76,6 +76,21 @@ def test_one_wall_makes_one_chain_and_a_wall_behind_it_none_over_it() -> None:
     assert (0,) in chains
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_side_wall_that_reaches_behind_the_array_is_in_chains_on_either_side(
+    side: float,
+) -> None:
+    beside = wall((0.4 * side, -0.3), (0.4 * side, 0.6))
+    ahead = wall((-0.3, 0.8), (0.3, 0.8))
+    chains = set(possible_chains([beside, ahead]))
+    assert {(0,), (1,), (0, 1), (1, 0)} <= chains
+    # A user in sight of it, by its image: the ray of its direction meets it.
+    image = np.array([0.6 * side, 0.3, 0.0])
+    places, met = unfolded(image[None], [beside, ahead])
+    assert met[0, 0] == 0
+    np.testing.assert_allclose(places[0], [0.2 * side, 0.3, 0.0], atol=ROUNDING)
+
+
 def test_without_mirrors_everything_is_where_it_is_seen() -> None:
     points = np.random.default_rng(0).uniform(-1, 1, (7, 3)) * [1, 1, 0]
     places, chains = unfolded(points, [])
