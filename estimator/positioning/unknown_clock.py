@@ -6,6 +6,7 @@ and it is ambiguous if another consistent one explains nearly as much elsewhere.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from scipy.constants import speed_of_light
@@ -24,6 +25,7 @@ from estimator.positioning.hypotheses import (
 from estimator.positioning.known_clock import on_our_clock
 from estimator.positioning.map_context import MapContext
 from estimator.positioning.position_report import ambiguous, path_reports, placed
+from estimator.positioning.posterior import beside
 from estimator.positioning.weighted_least_squares import Consensus
 from estimator.results.estimate import UserEstimate
 
@@ -41,7 +43,11 @@ def on_any_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     chains = {
         index: _chains(path.radius, path, room, found.how) for index, path in enumerate(found.paths)
     }
-    consistent = consistent_ones(chains, found, room, clock_known=False)
+    consistent = [
+        one
+        for one in consistent_ones(chains, found, room, clock_known=False)
+        if not _of_one_wave(one, found, room)
+    ]
     if not consistent:
         return UserEstimate(
             name=name,
@@ -93,6 +99,12 @@ def _chains(length: float, path: Path, room: MapContext, how: Bearing) -> tuple[
         for turned in (bearing, *how.around(bearing, end_reach(path, room)))
     ]
     return tuple(dict.fromkeys(met))
+
+
+def _of_one_wave(consensus: Consensus, found: PathSet, room: MapContext) -> bool:
+    """Tell whether two paths are parts of one wave that roughness bends: they tell no offset."""
+    paths = [found.paths[one.path] for one in consensus.sightings]
+    return any(beside(one, other, room) for one, other in combinations(paths, 2))
 
 
 def _energy(consensus: Consensus, found: PathSet) -> float:

@@ -120,19 +120,11 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
     )
     if found is None:
         return line
-    if found.explained < EXPLAINED and (
-        _deviations(line, found) > MOST_DEVIATIONS
-        or _area(found.covariance) > _area(line.covariance)
-    ):
-        return line  # in noise, or on a rougher wall, the image knows it better
+    if found.explained < EXPLAINED and _deviations(line, found) > MOST_DEVIATIONS:
+        return line
     covariance = found.covariance * _excess(line, found)
     late = found.late if found.explained >= EXPLAINED else None
     return replace(line, start=found.start, end=found.end, covariance=covariance, late=late)
-
-
-def _area(covariance: Float[np.ndarray, "2 2"]) -> float:
-    """Return the area of a region of confidence in tilt and offset, over that of a unit one."""
-    return float(np.sqrt(max(np.linalg.det(covariance), 0.0)))
 
 
 def _change(line: FittedLine, moved: CoherentLine) -> Float[np.ndarray, " 2"]:

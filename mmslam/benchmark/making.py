@@ -22,8 +22,16 @@ from simulator.dataset.task_runner import Workers
 ANSWERS = ("redraws", "room", "failure")
 """What a test part does not hold, beside the groups of truth and parameters."""
 
-TOLD = ("mmslam_format", "dataset_format", "conventions", "waves", "dimensions", "boresight")
-"""Attributes of a dataset that a part keeps."""
+TOLD = (
+    "mmslam_format",
+    "dataset_format",
+    "conventions",
+    "waves",
+    "dimensions",
+    "boresight",
+    "clock_offset_s",
+)
+"""Attributes of a dataset that a part keeps: without the clock's offset no delay is a length."""
 
 
 def make_part(

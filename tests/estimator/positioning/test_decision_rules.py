@@ -531,6 +531,17 @@ def test_two_paths_tell_the_offset_of_an_unknown_clock(dim: Dimension, length: f
     assert LENGTH < found.clock_deviation * speed_of_light < 5e-3
 
 
+def test_two_parts_of_one_bent_front_tell_no_offset(dim: Dimension) -> None:
+    # At a wall's end, one part over it and one beside it: they agree at some offset.
+    near = END - 2e-3 * ALONG
+    place = 1.8 * near / np.linalg.norm(near)
+    turned = place + np.array([0.009, 0.0, 0.0])
+    parts = [direct(dim, place, share=0.55), direct(dim, turned, share=0.4)]
+    found = decided(dim, parts, room(slanted(dim)), clock_known=False)
+    assert found.status == "ambiguous"
+    assert sum(one.used for one in found.paths) == 1
+
+
 @pytest.mark.parametrize("offset_ps", [0.0, 30.0])
 def test_one_path_with_an_unknown_clock_is_ambiguous(dim: Dimension, offset_ps: float) -> None:
     user = dim.user(0.2, 0.6)
