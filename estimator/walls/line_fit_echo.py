@@ -26,7 +26,7 @@ References
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 from scipy.linalg import cho_solve
 
 from estimator.geometry.lateness import Lateness
@@ -43,6 +43,7 @@ from estimator.walls.scatterer_row import (
     row_profiles,
     thinned,
 )
+from estimator.wavefronts.noise_variance import noise_variance
 
 STEPS = 2
 """Gauss-Newton steps: from an error of a hundredth of a cell the first leaves less than a
@@ -145,12 +146,28 @@ def fit_coherently(
     to_angle = np.array([[0.0, -2.0 / length], [1.0, 0.0]])
     covariance = to_angle @ by_step @ to_angle.T
     covariance[1, 1] += DEPTH**2
-    explained = 1 - float(np.vdot(residual, residual).real / np.vdot(data, data).real)
+    explained = _explained(data, residual, noise_variance(few.samples), parameters=echoes.shape[1])
     late = focus_shift(
         few, profiles, row, echoes, solved, slopes, moved, residual, strengths,
         places=places, levers=levers, part=PART * cell_along,
     )  # fmt: skip
     return CoherentLine(start=start, end=end, covariance=covariance, explained=explained, late=late)
+
+
+def _explained(
+    data: Complex[np.ndarray, " n"],
+    residual: Complex[np.ndarray, " n"],
+    noise: float,
+    *,
+    parameters: int,
+) -> float:
+    """Return the share of the echo, less the noise in it, that a fit explains. [-].
+
+    Of an echo in noise no fit explains most; what counts is what it leaves over the noise.
+    """
+    left = float(np.vdot(residual, residual).real) - noise * (residual.size - parameters)
+    whole = float(np.vdot(data, data).real) - noise * data.size
+    return 1 - max(left, 0.0) / whole if whole > 0 else 0.0
 
 
 def _moved(

@@ -8,6 +8,7 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo
 from estimator.walls.line_fit_echo import CoherentLine, fit_coherently
+from estimator.walls.line_refinement import EXPLAINED
 
 ELEMENTS, SPACING = 96, 0.5e-3
 FREQUENCIES = np.linspace(220e9, 260e9, 161)
@@ -120,6 +121,19 @@ def test_the_covariance_is_that_of_the_errors_for_noise_and_for_rough_heights() 
             squares.append(error @ np.linalg.solve(line.covariance, error))
     assert 0.6 < np.mean(squares) < 3.0
     assert np.mean(np.array(squares) < 13.8) > 0.9  # 99.9 % region
+
+
+@pytest.mark.parametrize(("noise", "depth", "explained"), [(1.0, 0.0, True), (1.0, 2e-3, False)])
+def test_the_share_that_a_row_explains_is_that_of_the_echo_without_its_noise(
+    noise: float, depth: float, explained: bool
+) -> None:
+    rng = np.random.default_rng(11)
+    start, end = _ends(np.radians(25.0), (0.02, 0.35))
+    line = _fit(_echo(rng, start, end, depth=depth, noise=noise), start, end)
+    # At 0 dB for each sample noise is half of the energy; scatterers that are strewn 2 mm deep
+    # (4 range phases of 2π) are no row. The noise is known to 2 %, and is as strong as the echo.
+    assert line is not None
+    assert (line.explained > EXPLAINED) == explained
 
 
 def test_turning_the_list_of_ends_round_changes_nothing_but_the_signs() -> None:
