@@ -16,7 +16,7 @@ smooth flat or convex surface, which is seen directly.
 """
 
 import numpy as np
-from jaxtyping import Complex64, Float
+from jaxtyping import Complex, Complex64, Float
 from scipy.constants import speed_of_light
 
 from estimator.array.resolution_cell import Resolution
@@ -31,6 +31,14 @@ SHIFTS = np.linspace(-0.75, 0.75, 7)
 TILTS = np.linspace(-2.0, 2.0, 9)
 """Directions of a reflection without curvature that are tried, about the peak's: such a reflection
 is as wide as the array, and its peaks lie beside its direction. [cells λ/2D]"""
+OUTSHONE = 0.25
+"""Coherence factor below which it is asked whether something brighter stands at the same range.
+[-]"""
+ABOUT = 8
+"""Beams on either side of a peak that are counted as what stands about it. [cells λ/2D]"""
+BRIGHTER = 4.0
+"""Energy at a range over that from about a peak, from which something else outshines it: then the
+coherence factor over all directions is 0.25 at most, as :data:`OUTSHONE` asks. [-]"""
 RANGE_SHIFTS = np.linspace(-0.5, 0.5, 3)
 """Ranges that are tried, about the peak's, whose pixel is 0.75 cells wide. [cells c/2B]"""
 
@@ -120,7 +128,37 @@ def coherence_factor(
         wave = (np.abs(tilted) ** 2).max(axis=1) / offset.size
         # Noise is taken out of the energy, but never more than all that is not the wave.
         best = np.maximum(best, wave / np.maximum(energy - offset.size * noise, wave + 1e-300))
+        outshone = np.flatnonzero(best < OUTSHONE)
+        if outshone.size:
+            bent = (aligned * turn)[outshone]
+            best[outshone] = np.maximum(best[outshone], _local_coherence(bent, tilts, unit))
     return best
+
+
+def _local_coherence(
+    aligned: Complex[np.ndarray, "points channels"],
+    tilts: Complex[np.ndarray, "tilts channels"],
+    unit: Float[np.ndarray, " channels"],
+) -> Float[np.ndarray, " points"]:
+    """Return the share of the energy from about a direction that is one wave; 0 if most is. [-].
+
+    Something brighter at the same range, in another direction, is no part of what stands in this
+    one: through a window over the aperture, which keeps its sidelobes out, only beams within
+    :data:`ABOUT` count. Where these hold most of the range's energy nothing outshines it.
+    """
+    window = 1 + np.cos(np.pi * unit)
+    shares = np.zeros(len(aligned))
+    within = np.exp(1j * np.pi * np.arange(-ABOUT, ABOUT + 1)[:, None] * unit)
+    windowed = aligned * window
+    every = np.einsum("pm,pm->p", windowed, windowed.conj()).real * unit.size
+    for tilt in tilts:
+        beams = np.abs(np.einsum("pm,bm->pb", windowed * tilt, within)) ** 2
+        about = beams.sum(axis=1)
+        # Of one wave the window puts a quarter of the power into each of the two beams beside.
+        share = 1.5 * beams[:, ABOUT] / np.maximum(about, np.finfo(float).tiny)
+        share[every < BRIGHTER * about] = 0.0
+        shares = np.maximum(shares, np.minimum(share, 1.0))
+    return shares
 
 
 def aligned_profiles(
