@@ -1,6 +1,6 @@
 """Rough faces in chains of surfaces: small-slope weights as monopole and dipole sources.
 
-Chains use the weights of :mod:`simulator.scattering.small_slope` at one frequency, over the
+Chains use the weights of :mod:`simulator.scattering.small_slope_2d` at one frequency, over the
 tangent plane's coefficient there, and no fringe currents at edges. The second order is evaluated
 for the direction to the middle of the target's visible part.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Float, Float32
 
 from simulator.geometry.faces import Face
-from simulator.scattering.small_slope import MOST_ALONG, RoughLine, kernels
+from simulator.scattering.small_slope_2d import MOST_ALONG, RoughLine, kernels
 
 LEAST_SPAN = 1e-3
 """Least half angle between the directions at which a rough wall's weights are matched. [rad]"""
@@ -32,7 +32,7 @@ def rough_sources(
 ) -> Float32[np.ndarray, "3 ports wall"] | Complex64[np.ndarray, "3 ports wall"]:
     r"""Write a rough wall's weights as a monopole and a dipole at each facet.
 
-    The weight :math:`2B/QR` (:mod:`simulator.scattering.small_slope`, first order) takes the place
+    The weight :math:`2B/QR` (:mod:`simulator.scattering.small_slope_2d`, first order) is in place
     of :math:`\cos\theta_{in} + \cos\theta_{out}`. It is matched in three directions that span the
     target's visible part by :math:`a + b\,\hat u\cdot\hat t + c\,\hat u\cdot\hat n`: between them
     the error is of third order in the angle they span.

@@ -2,7 +2,7 @@ from .bistatic_kernel import BistaticKernel, Port, pattern_table, reflection_row
 from .patch_sum import Factor, Look, scattered_by_patches
 from .physical_optics import facet_transform, scattered
 from .rough_triangles import rough_weights
-from .weighted_curvature import (
+from .weighted_curvature_3d import (
     ConductorKernel,
     DielectricKernel,
     curvature_weight,

@@ -28,7 +28,7 @@ from simulator.geometry.facets import SMOOTHED, is_rough
 from simulator.materials.facet_reflection import Legs, mirror_shares
 from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.scattering.triangle_transform import triangle_transform
-from simulator.scattering.weighted_curvature import (
+from simulator.scattering.weighted_curvature_3d import (
     curvature_weight,
     middle_permittivity,
     scattering_kernel,

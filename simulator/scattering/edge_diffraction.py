@@ -37,7 +37,7 @@ from simulator.antennas.ports import Ports
 from simulator.geometry.facets import Facets
 from simulator.geometry.profile_lines import Edge
 from simulator.materials.fresnel_slab import Conductor, Material
-from simulator.scattering.small_slope import kernels
+from simulator.scattering.small_slope_2d import kernels
 
 NUDGE = 1e-6
 """Distance from a pole at which both terms are evaluated instead of at the pole; their difference

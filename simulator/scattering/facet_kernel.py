@@ -25,7 +25,7 @@ from simulator.materials.facet_reflection import Legs, conductor_mirror
 from simulator.materials.fresnel_slab import Conductor, Material
 from simulator.numerics.nufft_sum import FrequencySum
 from simulator.scattering.triangle_transform import triangle_transform
-from simulator.scattering.weighted_curvature import (
+from simulator.scattering.weighted_curvature_3d import (
     curvature_weight,
     half_space_mirror,
     scattering_kernel,

@@ -3,8 +3,8 @@
 A :class:`Leg` holds distances and directions from one port to all facets, a
 :class:`MaterialPart` the facets of one material with their weights: Fresnel's coefficients on
 smooth facets, second-order small-slope weights on rough lines
-(:mod:`simulator.scattering.small_slope`), weighted curvature on rough triangles
-(:mod:`simulator.scattering.weighted_curvature`).
+(:mod:`simulator.scattering.small_slope_2d`), weighted curvature on rough triangles
+(:mod:`simulator.scattering.weighted_curvature_3d`).
 """
 
 import threading
@@ -25,13 +25,13 @@ from simulator.materials.facet_reflection import (
 from simulator.materials.fresnel_slab import Conductor
 from simulator.numerics.nufft_sum import FrequencySum, chebyshev_nodes
 from simulator.scattering.rough_triangles import rough_weights
-from simulator.scattering.small_slope import (
+from simulator.scattering.small_slope_2d import (
     DirectionGrid,
     RoughLine,
     echo_weights,
     reflection_of_front,
 )
-from simulator.scattering.weighted_curvature import half_space_mirror, middle_permittivity
+from simulator.scattering.weighted_curvature_3d import half_space_mirror, middle_permittivity
 
 ROUGH_NODES = 4
 """Fewest frequencies at which weights of rough lines are sampled: over a third of an octave, the

@@ -31,7 +31,7 @@ from simulator.materials.facet_reflection import Legs, conductor_mirror, mirror_
 from simulator.materials.fresnel_slab import Conductor, Material, reflection
 from simulator.numerics.nufft_sum import chebyshev_nodes, lagrange_basis
 from simulator.scattering.triangle_transform import triangle_transform
-from simulator.scattering.weighted_curvature import (
+from simulator.scattering.weighted_curvature_3d import (
     curvature_weight,
     half_space_mirror,
     middle_permittivity,

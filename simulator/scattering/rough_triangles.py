@@ -7,7 +7,7 @@ from simulator.geometry.facets import Facets
 from simulator.materials.facet_reflection import Legs
 from simulator.materials.fresnel_slab import Material
 from simulator.numerics.vectors import added, dot
-from simulator.scattering.weighted_curvature import curvature_weight, scattering_kernel
+from simulator.scattering.weighted_curvature_3d import curvature_weight, scattering_kernel
 
 
 def rough_weights(

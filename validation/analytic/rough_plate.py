@@ -41,7 +41,7 @@ from simulator.antennas.field_pattern import field_gain
 from simulator.antennas.polarization import VERTICAL
 from simulator.materials.facet_reflection import Legs, facet_coefficients
 from simulator.materials.fresnel_slab import Material
-from simulator.scattering.weighted_curvature import middle_permittivity, scattering_kernel
+from simulator.scattering.weighted_curvature_3d import middle_permittivity, scattering_kernel
 
 TERMS = 30
 """Terms of the series: for s below 5 the remainder is below 1e-12. [-]"""

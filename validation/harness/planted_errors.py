@@ -88,14 +88,14 @@ PLANTED = (
     ),
     PlantedError(
         name="Bragg kernel of the other polarization",
-        file="simulator/scattering/weighted_curvature.py",
+        file="simulator/scattering/weighted_curvature_3d.py",
         right="return self._constant + 2.0 * (one * other - fields)",
         wrong="return self._constant + 2.0 * (fields - one * other)",
         claims=("rough_plate_in_space",),
     ),
     PlantedError(
         name="Bragg kernel of the other polarization in two dimensions",
-        file="simulator/scattering/small_slope.py",
+        file="simulator/scattering/small_slope_2d.py",
         right="bragg = -2 * q_i * q_s if vertical else 2 * (1 + t_i * t_s)",
         wrong="bragg = -2 * (1 + t_i * t_s) if vertical else 2 * q_i * q_s",
         claims=("full_wave_roughness",),

@@ -20,7 +20,7 @@ from scenes.surfaces.shape import grid_triangles
 from simulator.antennas.ports import Pattern, Ports
 from simulator.geometry.facets import Facets, profile_surface, surface_facets
 from simulator.scattering.physical_optics import facet_transform, scattered
-from simulator.scattering.small_slope import normal_component
+from simulator.scattering.small_slope_2d import normal_component
 
 BAND = np.linspace(220e9, 295e9, 76)
 WAVENUMBERS = 2 * np.pi * BAND / speed_of_light

@@ -19,8 +19,8 @@ wave, are
 - the uplink.
 
 The simulator sums rough walls by the small-slope approximation and their edges by fringe currents
-(:mod:`simulator.scattering.small_slope`, :mod:`simulator.scattering.edge_diffraction`), whose error
-grows with the rms slope, :math:`\sqrt2\,\sigma/l` of a Gaussian surface. On the figure, a wall
+(:mod:`simulator.scattering.small_slope_2d`, :mod:`simulator.scattering.edge_diffraction`); errors
+grow with the rms slope, :math:`\sqrt2\,\sigma/l` of a Gaussian surface. On the figure, a wall
 within the first limits is outlined.
 
 Claims that are asserted (:data:`LIMITS`), for each wall:

@@ -23,7 +23,7 @@ from simulator.scattering import physical_optics
 from simulator.scattering.bistatic_kernel import BistaticKernel, Port
 from simulator.scattering.patch_sum import scattered_by_patches
 from simulator.scattering.physical_optics import scattered
-from simulator.scattering.weighted_curvature import (
+from simulator.scattering.weighted_curvature_3d import (
     ConductorKernel,
     DielectricKernel,
     curvature_weight,

@@ -7,7 +7,7 @@ from scipy.constants import speed_of_light
 from scenes.schema.radio import Polarization
 from simulator.materials.fresnel_slab import Conductor, Dielectric, Material
 from simulator.materials.permittivity import ConstantPermittivity
-from simulator.scattering.small_slope import RoughLine, echo_weights, extended, kernels
+from simulator.scattering.small_slope_2d import RoughLine, echo_weights, extended, kernels
 
 FREQUENCY = 260e9
 WAVELENGTH = speed_of_light / FREQUENCY
