@@ -21,7 +21,7 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import MeasurementError
-from mmslam.output import OutputError, replacing
+from mmslam.output import OutputError, refuse_existing, replacing
 from mmslam.pipeline import simulate
 from scenes.scenario import Noise, Scenario
 
@@ -94,7 +94,7 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
     matrices["rx_pos"] = np.array([user.position for user in scenario.users.values()])
     matrices["tx_pos"] = elements.mean(axis=0)[None]
     heard = [any(abs(one.gain) > 0 for one in some) for some in paths.values()]
-    with replacing(folder, _refuse) as new:
+    with replacing(folder, refuse_existing) as new:
         new.mkdir()
         for name, values in matrices.items():
             held: dict[str, Any] = {name: values.astype(np.float32)}
@@ -112,10 +112,6 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
             user=np.array(list(scenario.users)),
         )
     return folder
-
-
-def _refuse(path: Path) -> str | None:
-    return f"{path} exists; move it away or choose another folder"
 
 
 def _matrices(users: Sequence[Sequence["UserPath"]]) -> dict[str, np.ndarray]:

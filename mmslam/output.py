@@ -87,6 +87,11 @@ def replacing(target: Path, refusal: Refusal) -> Iterator[Path]:
         _put_in_place(aside, target, refusal)
 
 
+def refuse_existing(target: Path) -> str:
+    """Refuse to replace a folder, whatever it is: for :func:`replacing`."""
+    return f"{target} exists; move it away or choose another folder"
+
+
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
     """Yield the path of a new file that becomes ``target`` if the block ends without an error.

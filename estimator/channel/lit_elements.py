@@ -10,7 +10,7 @@ wave that they bend much is no mirror-like one (:attr:`estimator.channel.path.Pa
 Linear and planar arrays differ in which elements are neighbours, and in no more.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -43,6 +43,23 @@ or a planar array's four with three. [-]"""
 LEAST_SHADOW = 0.05
 """Share of the elements in the shadow from which it counts: less moves nothing by more than the
 noise does. [-]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LitPart:
+    """What a wave reaches of a pilot's array, seen from its own centre."""
+
+    lit: Bool[np.ndarray, " elements"] | None  # the elements; None: all
+    pilot: Uplink  # what they received, with positions over their centre
+    centre: Float[np.ndarray, " 3"]  # of these; of all the array's origin [m]
+
+
+def lit_part(uplink: Uplink, source: Float[np.ndarray, " 3"]) -> LitPart:
+    """Return what a wave reaches of an array; see :func:`lit_elements`."""
+    lit = lit_elements(uplink, source)
+    part = part_of(uplink, lit)
+    centre = np.zeros(3) if lit is None else part.positions.mean(axis=0)
+    return LitPart(lit=lit, pilot=replace(part, positions=part.positions - centre), centre=centre)
 
 
 def lit_elements(

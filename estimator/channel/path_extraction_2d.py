@@ -10,7 +10,7 @@ from scipy.constants import speed_of_light
 from estimator import false_alarm
 from estimator.channel.angle_range_map_2d import angle_range_map
 from estimator.channel.level_tilt import with_level_tilts
-from estimator.channel.lit_elements import lit_elements, part_of, shadow_of
+from estimator.channel.lit_elements import lit_part, shadow_of
 from estimator.channel.path import (
     LEAST_SHARE,
     MOST_PATHS,
@@ -139,21 +139,18 @@ def _unresolved(uplink: Uplink, waves: Sequence[SphericalWave]) -> bool:
 def _refined(uplink: Uplink, aoa: float, path_length: float) -> WaveStart:
     """Refine a peak of the map on the elements that its wave reaches, from their own centre."""
     peak = path_length * LINEAR.towards(np.array([aoa]))
-    lit = lit_elements(uplink, peak)
-    part = part_of(uplink, lit)
-    centre = np.zeros(3) if lit is None else part.positions.mean(axis=0)
-    source = peak - centre
-    local = replace(part, positions=part.positions - centre)
+    reached = lit_part(uplink, peak)
+    local, source = reached.pilot, peak - reached.centre
     near = float(np.linalg.norm(source))
     wave = fit_spherical_wave(local, aoa=float(np.arccos(source[0] / near)), path_length=near)
     start = search_curvature(local, aoa=wave.aoa, path_length=wave.path_length)
-    seen = centre + start.radius * LINEAR.towards(np.array([start.aoa]))
+    seen = reached.centre + start.radius * LINEAR.towards(np.array([start.aoa]))
     radius = float(np.linalg.norm(seen))
     return WaveStart(
         aoa=float(np.arccos(seen[0] / radius)),
         path_length=start.path_length - start.radius + radius,
         radius=radius,
-        lit=lit,
+        lit=reached.lit,
     )
 
 

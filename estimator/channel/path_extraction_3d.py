@@ -5,10 +5,9 @@ reflect, or none, has the curvature of its delay; a wave that an edge or a rough
 rounder.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 from scipy.constants import speed_of_light
 from scipy.linalg import block_diag
 
@@ -16,7 +15,7 @@ from estimator import false_alarm
 from estimator.array.planar_array import PlanarArray
 from estimator.channel.angle_range_map_3d import direction_map
 from estimator.channel.level_tilt import with_level_tilts
-from estimator.channel.lit_elements import lit_elements, part_of, shadow_of
+from estimator.channel.lit_elements import LitPart, lit_part, shadow_of
 from estimator.channel.path import LEAST_SHARE, MOST_PATHS, Path, PathSet
 from estimator.geometry.bearing_3d import PLANAR
 from estimator.imaging.range_gating import gated
@@ -79,25 +78,26 @@ def find_space_paths(
             break
         length = float(this_map.path_length[k])
         near = gated(residual, length, reach=2 * array.half + GATE_CELLS * cell)
+        cosines = float(this_map.along[i]), float(this_map.up[j])
         try:
-            seen = _fitted(near, array, (float(this_map.along[i]), float(this_map.up[j])), length)
+            free, reached = _fitted(near, array, cosines, length)
         except NoWaveError:
             break  # no summit near the peak: a ridge, not a wave
         # With its own curvature, whatever it is, less of the wave is left behind.
-        field = wavefront_field(residual.positions, residual.frequencies, seen.free)
-        if seen.lit is not None:
-            field[~seen.lit] = 0.0
+        field = wavefront_field(residual.positions, residual.frequencies, free)
+        if reached.lit is not None:
+            field[~reached.lit] = 0.0
         share = float(np.vdot(field, field).real) / energy
         if share < LEAST_SHARE:
             break  # speckle
         path = Path(
-            wave=replace(seen.free, covariance=seen.free.covariance[:3, :3]),
-            free=seen.free,
+            wave=replace(free, covariance=free.covariance[:3, :3]),
+            free=free,
             share=share,
             unambiguous=speed_of_light / step,
-            shadow=shadow_of(uplink, seen.lit),
+            shadow=shadow_of(uplink, reached.lit),
         )
-        paths.append(_bound(seen, path) if clock_known and path.specular else path)
+        paths.append(_bound(reached, path) if clock_known and path.specular else path)
         residual = replace(residual, samples=residual.samples - field)
         remaining = float(np.sum(np.abs(residual.samples) ** 2)) - noise * residual.samples.size
         if remaining < LEAST_SHARE * energy:
@@ -116,47 +116,40 @@ def find_space_paths(
     return with_level_tilts(uplink, found_paths)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Seen:
-    """A wave that was fitted on the elements that it reaches."""
-
-    free: Wavefront  # at the array's centre
-    lit: Bool[np.ndarray, " elements"] | None  # the elements that it reaches; None: all
-    part: Uplink  # what they received, with positions over their own centre
-    centre: Float[np.ndarray, " 3"]  # of these [m]
-
-
-def _fitted(near: Uplink, array: PlanarArray, cosines: tuple[float, float], length: float) -> _Seen:
+def _fitted(
+    near: Uplink, array: PlanarArray, cosines: tuple[float, float], length: float
+) -> tuple[Wavefront, LitPart]:
     """Fit a wave with a curvature of its own, from the centre of the elements that it reaches."""
     peak = length * PLANAR.towards(np.array(cosines))
-    lit = lit_elements(near, peak)
-    if lit is None:
-        start = _best_lobe(near, array, cosines, length)
-        part, centre = near, np.zeros(3)
-    else:
-        part = part_of(near, lit)
-        centre = part.positions.mean(axis=0)
-        part = replace(part, positions=part.positions - centre)
-        source = peak - centre
-        far = float(np.linalg.norm(source))
-        start = _best_lobe(part, array, (float(source[0]) / far, float(source[2]) / far), far)
+    reached = lit_part(near, peak)
+    if reached.lit is not None:
+        source = peak - reached.centre
+        length = float(np.linalg.norm(source))
+        cosines = float(source[0]) / length, float(source[2]) / length
+    start = _best_lobe(reached.pilot, array, cosines, length)
     free = fit_wavefront(
-        part, cosines=start.cosines, path_length=start.path_length, curvature=start.curvature
+        reached.pilot,
+        cosines=start.cosines,
+        path_length=start.path_length,
+        curvature=start.curvature,
     )
-    if lit is not None:
-        free = about_another_centre(free, -centre)
-    return _Seen(free=free, lit=lit, part=part, centre=centre)
+    if reached.lit is not None:
+        free = about_another_centre(free, -reached.centre)
+    return free, reached
 
 
-def _bound(seen: _Seen, path: Path) -> Path:
+def _bound(reached: LitPart, path: Path) -> Path:
     """Fit a wave again with the curvature of its delay."""
-    free = seen.free if seen.lit is None else about_another_centre(seen.free, seen.centre)
+    free = path.free
+    assert isinstance(free, Wavefront)
+    if reached.lit is not None:
+        free = about_another_centre(free, reached.centre)
     try:
-        wave = fit_wavefront(seen.part, cosines=free.cosines, path_length=free.path_length)
+        wave = fit_wavefront(reached.pilot, cosines=free.cosines, path_length=free.path_length)
     except NoWaveError:
         return path  # the summit with the delay's curvature lies elsewhere: keep the free one
-    if seen.lit is not None:
-        wave = about_another_centre(wave, -seen.centre)
+    if reached.lit is not None:
+        wave = about_another_centre(wave, -reached.centre)
     return replace(path, wave=wave)
 
 

@@ -85,7 +85,7 @@ class PlanarRoom:
             *aliasing_notes(max(self.array.spacing), self.echo.frequencies, sine),
             *order_notes(
                 [abs(float(wall.centre @ wall.normal)) for wall in self.map.walls],
-                self.map.orders,
+                [plane.orders for plane in self.map.planes],
                 unambiguous_range(self.echo),
             ),
         )

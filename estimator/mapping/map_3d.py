@@ -19,8 +19,8 @@ from estimator.geometry.wall_covariance import joint_covariance
 from estimator.imaging.range_compression import range_profiles
 from estimator.imaging.survey_3d import VolumeSurvey, peaks_around, survey_volume
 from estimator.mapping.range_order import (
-    order_probabilities,
     other_distances,
+    planes_within_range,
     unambiguous_range,
 )
 from estimator.mapping.wall_unfolding import confidence_of
@@ -28,10 +28,8 @@ from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.plane_fit import FittedPlane, plane_axes, towards_array
 from estimator.walls.wall_detection_3d import (
-    Planes,
     detect_planes,
     lobe_of_a_wall,
-    peaks_on,
     unassigned_peaks,
 )
 
@@ -96,8 +94,6 @@ class SpaceMap:
     planes: tuple[FittedPlane, ...]  # as the raw image shows them
     walls: tuple[PlaneWall, ...]  # the same at their true place
     seen_through: tuple[tuple[int, ...], ...]  # indices of walls, from the array outward
-    orders: tuple[Float[np.ndarray, " orders"], ...]
-    """How probable it is of each that it stands there, or farther by c/2Δf, 2 c/2Δf, ..."""
     joint_covariance: Float[np.ndarray, "parameters parameters"]
     """Of all walls' (two tilts [rad], offset [m]), one wall after the other."""
     targets: tuple[SpaceTarget, ...]  # strongest first
@@ -118,8 +114,11 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
     """
     looked = survey_volume(echo, array)
     coarse = coarse_resolution(planar_resolution(array, echo))
-    fitted, chances = _within_range(detect_planes(echo, array, looked), echo, array, looked)
-    planes, walls, seen = unfold_planes(fitted, coarse)
+    profiles = range_profiles(echo)
+    found = detect_planes(echo, array, looked, profiles)
+    planes, walls, seen = unfold_planes(
+        planes_within_range(found, echo, array, looked, profiles), coarse
+    )
     joint = joint_covariance(
         [plane.wall for plane in planes], seen, walls, reflected=mirrored_wall, change=plane_change
     )
@@ -134,31 +133,9 @@ def build_space_map(echo: Echo, array: PlanarArray) -> SpaceMap:
             unassigned_peaks(looked.peaks, planes, coarse), planes, echo, array
         ),
         seen_through=seen,
-        orders=tuple(
-            next(chance for plane, chance in zip(fitted, chances, strict=True) if plane is one)
-            for one in planes
-        ),
         targets=_targets(echo, array, looked, [plane.wall for plane in planes], walls),
         survey=looked,
     )
-
-
-def _within_range(
-    planes: Planes, echo: Echo, array: PlanarArray, looked: VolumeSurvey
-) -> tuple[tuple[FittedPlane, ...], tuple[Float[np.ndarray, " orders"], ...]]:
-    """Leave out planes that are echoes from beyond; return the orders of the others."""
-    coarse = coarse_resolution(planar_resolution(array, echo))
-    profiles = range_profiles(echo)
-    kept, orders = [], []
-    for plane, head_on in zip(planes.fitted, planes.head_on, strict=True):
-        peaks = looked.peaks[peaks_on(looked.peaks, plane.wall, coarse)]
-        chances = order_probabilities(
-            plane.wall, peaks, echo, array, flat_wave=head_on, profiles=profiles
-        )
-        if chances.any():
-            kept.append(plane)
-            orders.append(chances)
-    return tuple(kept), tuple(orders)
 
 
 def _of_no_wall(
@@ -178,9 +155,27 @@ def _of_no_wall(
 
 def other_rooms(room: SpaceMap, echo: Echo) -> tuple[tuple[float, tuple[PlaneWall, ...]], ...]:
     """Return the walls at all distances that they may have, each choice with its probability."""
-    if all(chances[0] == 1.0 for chances in room.orders):
+    if all(plane.orders[0] == 1.0 for plane in room.planes):
         return ()
-    return other_distances(room.walls, room.orders, unambiguous_range(echo), most=MOST_ROOMS)
+    planes = [plane.wall for plane in room.planes]
+    orders = [plane.orders for plane in room.planes]
+    choices = other_distances(planes, orders, unambiguous_range(echo), most=MOST_ROOMS)
+    return tuple((chance, _unfolded(chosen, room)) for chance, chosen in choices)
+
+
+def _unfolded(chosen: Sequence[PlaneWall], room: SpaceMap) -> tuple[PlaneWall, ...]:
+    """Unfold planes at chosen distances as :func:`unfold_planes` does; keep walls that stay."""
+    walls: list[PlaneWall] = []
+    for plane, fitted, known in zip(chosen, room.planes, room.walls, strict=True):
+        chain = chain_to(plane.centre, walls)
+        stays = plane is fitted.wall and all(walls[j] is room.walls[j] for j in chain)
+        if stays and chain == room.seen_through[len(walls)]:
+            walls.append(known)
+            continue
+        for j in chain:
+            plane = mirrored_wall(plane, walls[j])
+        walls.append(plane)
+    return tuple(walls)
 
 
 def peaks_aside(
@@ -362,9 +357,7 @@ def _target(
 def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
     """Return the walls of a map, as they are reported."""
     mirrors = []
-    for plane, wall, through, orders in zip(
-        room.planes, room.walls, room.seen_through, room.orders, strict=True
-    ):
+    for plane, wall, through in zip(room.planes, room.walls, room.seen_through, strict=True):
         places = (wall.corners - wall.centre) @ wall.axes.T
         middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
         sides = np.array([[places[:, 0].min(), middle[1]], [places[:, 0].max(), middle[1]]])
@@ -375,7 +368,7 @@ def mirrors_in_world(room: SpaceMap, frame: ArrayFrame) -> tuple[Mirror, ...]:
                 end=ends[1],
                 normal=frame.turned_to_world(wall.normal),
                 covariance=wall.covariance,
-                confidence=min(confidence_of(plane.confidence, through), float(orders[0])),
+                confidence=min(confidence_of(plane.confidence, through), float(plane.orders[0])),
                 level_db=float(
                     10 * np.log10(plane.level / max(plane.background, LEAST_BACKGROUND))
                 ),

@@ -13,16 +13,22 @@ the echo is calibrated; and what the array's antennas gain is not known.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.planar_array import PlanarArray, planar_resolution
+from estimator.array.resolution_cell import coarse_resolution
 from estimator.geometry.wall_3d import PlaneWall
 from estimator.imaging.range_alias import ORDERS, focus_by_range
-from estimator.imaging.range_compression import RangeProfiles, range_profiles, unambiguous_path
+from estimator.imaging.range_compression import RangeProfiles, unambiguous_path
+from estimator.imaging.survey_3d import VolumeSurvey
 from estimator.measurement.model import Echo
+from estimator.prediction.echo_calibration import CALIBRATED, GAINS_DB
+from estimator.walls.plane_fit import FittedPlane
+from estimator.walls.wall_detection_3d import Planes, beyond_the_flash, peaks_on
 
 FEWEST = 3
 """Fewest peaks beside the array's reflection whose mean is taken: of two nothing tells how they
@@ -31,18 +37,9 @@ MOST = 40
 """Brightest peaks that are focused at all distances, for time. [-]"""
 TOLD = 3.0
 """Deviations of a mean of log ratios from 0, from which they tell near from far. [-]"""
-FLASH_CELLS = 4.0
-"""Distance beyond the array's extent, from the foot of its perpendicular, within which peaks are
-the array's own reflection and its sidelobes, as for
-:data:`estimator.walls.wall_detection_3d.FLASH_CELLS`. [cells]"""
-CALIBRATED = 0.5
-"""Probability that the array's antennas are isotropic and the echo is calibrated, as for edges
-(:data:`estimator.positioning.edge_evidence.CALIBRATED`). [-]"""
 COEFFICIENTS_DB = (-25.0, 1.0)
 """Range of the reflection coefficients of walls met head-on, from a lossy board to a conductor, and
 the error of a level. [dB]"""
-GAINS_DB = 90.0
-"""Range of the gain out and back otherwise. [dB]"""
 FARTHER = 0.5
 """Prior probability of each order over that of the one before: a sweep is mostly chosen for the
 room that it is taken in. An assumption. [-]"""
@@ -62,7 +59,7 @@ def order_probabilities(
     array: PlanarArray,
     *,
     flat_wave: bool,
-    profiles: RangeProfiles | None = None,
+    profiles: RangeProfiles,
 ) -> Float[np.ndarray, " orders"]:
     """Return how probable it is that a plane stands where it is imaged, or farther by n ranges.
 
@@ -77,7 +74,7 @@ def order_probabilities(
     flat_wave
         Whether the array's own reflection in it was seen.
     profiles
-        Of the echo, not tapered, if known.
+        Of the echo, not tapered.
 
     Returns
     -------
@@ -101,6 +98,34 @@ def order_probabilities(
     orders = density * FARTHER ** np.arange(ORDERS + 1)
     orders[orders < NEGLIGIBLE * orders.sum()] = 0.0
     return np.asarray(orders / orders.sum())
+
+
+def planes_within_range(
+    planes: Planes,
+    echo: Echo,
+    array: PlanarArray,
+    looked: VolumeSurvey,
+    profiles: RangeProfiles,
+) -> list[FittedPlane]:
+    """Leave out planes that are echoes from beyond; give the others their orders.
+
+    Parameters
+    ----------
+    planes
+        As they were found.
+    echo, array, looked, profiles
+        As they were found in.
+    """
+    coarse = coarse_resolution(planar_resolution(array, echo))
+    kept = []
+    for plane, head_on in zip(planes.fitted, planes.head_on, strict=True):
+        peaks = looked.peaks[peaks_on(looked.peaks, plane.wall, coarse)]
+        chances = order_probabilities(
+            plane.wall, peaks, echo, array, flat_wave=head_on, profiles=profiles
+        )
+        if chances.any():
+            kept.append(replace(plane, orders=chances))
+    return kept
 
 
 def other_distances(
@@ -168,16 +193,14 @@ def _by_curvature(
     peaks: Float[np.ndarray, "peaks 3"],
     echo: Echo,
     array: PlanarArray,
-    profiles: RangeProfiles | None,
+    profiles: RangeProfiles,
 ) -> float:
     """Return by how many deviations a plane's peaks are focused better from farther. [-]."""
     fine = planar_resolution(array, echo)
-    foot = float(wall.centre @ wall.normal) * wall.normal
-    blur = FLASH_CELLS * fine.across_ray * float(np.linalg.norm(foot))
-    aside = peaks[np.linalg.norm(peaks - foot, axis=-1) > array.half + blur][:MOST]
+    aside = peaks[beyond_the_flash(peaks, wall, array, fine)][:MOST]
     if len(aside) < FEWEST:
         return 0.0
-    found = focus_by_range(profiles or range_profiles(echo), aside, fine)
+    found = focus_by_range(profiles, aside, fine)
     ratios: np.ndarray = np.log(found.beyond / found.here)
     spread = float(ratios.std(ddof=1) / np.sqrt(len(ratios)))
     return float(ratios.mean()) / max(spread, float(np.finfo(float).tiny))

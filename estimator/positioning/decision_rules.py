@@ -42,7 +42,7 @@ def decide(
             (chance, rule(name, found, replace(room, walls=walls, rooms=())))
             for chance, walls in room.rooms
         ]
-        answer = over_several_rooms(answers, axes=found.how.coordinates)
+        answer = over_several_rooms(answers, how=found.how)
     else:
         answer = rule(name, found, room)
     if answer.status == "found" and not room.imaged:

@@ -17,6 +17,7 @@ from math import exp, pi, sqrt
 import numpy as np
 from jaxtyping import Float
 
+from estimator.prediction.echo_calibration import CALIBRATED, GAINS_DB
 from estimator.prediction.edge_echo import edge_echoes_db
 
 ACROSS = 1 / 3
@@ -24,11 +25,6 @@ ACROSS = 1 / 3
 upright polarisation are usual. [-]"""
 COEFFICIENTS_DB = 25.0
 """Range of the reflection coefficients of boards and panes, below 1. [dB]"""
-CALIBRATED = 0.5
-"""Probability that the array's antennas are isotropic, and the echo is calibrated: as of users'
-(:data:`estimator.positioning.level_likelihood.ISOTROPIC`). [-]"""
-GAINS_DB = 90.0
-"""Range of the gain out and back otherwise: -40 to 50 dB. [dB]"""
 DEVIATION_DB = 2.0
 """Standard deviation of an edge's level: a pixel of the survey loses up to 1.8 dB of it. Edges of
 smooth conductors at 20 to 65 degrees were within 0.4 dB, and of panes within 4 dB of each other's

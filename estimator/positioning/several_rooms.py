@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from estimator.compute.distributions import chi_square_quantile
-from estimator.positioning.hypotheses import SAME
+from estimator.geometry.bearing import Bearing
+from estimator.positioning.hypotheses import same_square
 from estimator.positioning.position_report import ambiguous
 from estimator.positioning.posterior import CERTAIN
 from estimator.results.estimate import UserEstimate
@@ -22,7 +22,7 @@ WHERE_WALLS_STAND = (
 
 
 def over_several_rooms(
-    answers: Sequence[tuple[float, UserEstimate]], *, axes: Sequence[int]
+    answers: Sequence[tuple[float, UserEstimate]], *, how: Bearing
 ) -> UserEstimate:
     """Weigh the answers in several rooms by the rooms' probabilities.
 
@@ -30,8 +30,8 @@ def over_several_rooms(
     ----------
     answers
         The probability of each room, and the answer in it.
-    axes
-        Coordinates that the array measures.
+    how
+        What the array measures of a direction.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def over_several_rooms(
     groups: list[tuple[float, UserEstimate]] = []
     for share, place in places:
         for number, (before, first) in enumerate(groups):
-            if _same(first, place, axes):
+            if _same(first, place, how):
                 groups[number] = (before + share, first)
                 break
         else:
@@ -66,7 +66,7 @@ def over_several_rooms(
         return replace(best, reason=None)
     # In one room alone it may be open for a reason of its own.
     firsts = [answer for _, answer in answers if answer.position is not None]
-    agree = len(firsts) == len(answers) and all(_same(firsts[0], one, axes) for one in firsts)
+    agree = len(firsts) == len(answers) and all(_same(firsts[0], one, how) for one in firsts)
     reason = best.reason if agree and best.reason is not None else WHERE_WALLS_STAND
     return ambiguous(best, reason, others)
 
@@ -79,14 +79,15 @@ def _shares(answer: UserEstimate) -> list[tuple[float, UserEstimate]]:
     return [(one.probability or 0.0, one) for one in places]
 
 
-def _same(one: UserEstimate, other: UserEstimate, axes: Sequence[int]) -> bool:
+def _same(one: UserEstimate, other: UserEstimate, how: Bearing) -> bool:
     assert one.position is not None
     assert other.position is not None
-    between: Float[np.ndarray, " axes"] = (one.position - other.position)[list(axes)]
+    axes = how.coordinates
+    between: Float[np.ndarray, " axes"] = (one.position - other.position)[axes]
     if np.linalg.norm(between) < SAME_PLACE:
         return True
     if one.covariance is None or other.covariance is None:
         return False
-    spread = (one.covariance + other.covariance)[np.ix_(list(axes), list(axes))]
+    spread = (one.covariance + other.covariance)[np.ix_(axes, axes)]
     square = between @ np.linalg.solve(spread, between)
-    return bool(square < chi_square_quantile(SAME, len(axes)))
+    return bool(square < same_square(how))

@@ -11,7 +11,7 @@ from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
 from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
-from estimator.walls.fitted_line import FittedLine
+from estimator.walls.fitted_line import FittedLine, is_uncertain
 from estimator.walls.line_fit_echo import CoherentLine, fit_coherently
 from estimator.walls.line_relations import BEYOND_END, lies_on
 
@@ -35,10 +35,6 @@ MOST_DEVIATIONS = 6.0
 leaves much of the echo unexplained is not believed. Of 118 lines in 33 rooms such rows moved eight
 by 9 to 13, all in right-angled corners, where what both walls reflect comes from the ranges of each
 wall's own echo; all moved away from the truth, by 0.1° to 0.4°. [-]"""
-LOOSE = 0.5
-"""Deviation of a row's ends or offset from which it is not believed: the fit is linear over less.
-In noise, rows of two random rooms were known to 19° and 234°, their lines in the image to 0.05° and
-0.3°. [cells]"""
 EXPLAINED = 0.9
 """Share of the echo at a wall's ranges that its row explains where nothing else is: 0.93 to 0.996
 in these rooms, and 0.6 to 0.76 in their corners. [-]"""
@@ -122,19 +118,13 @@ def _refined(echo: Echo, line: FittedLine, others: Float[np.ndarray, "others 9 3
         beyond=(beyond[0], beyond[1]),
         others=others.reshape(-1, 3),
     )
-    if found is None or _is_loose(found, line, resolution):
+    if found is None or is_uncertain(replace(line, covariance=found.covariance), resolution):
         return line
     if found.explained < EXPLAINED and _deviations(line, found) > MOST_DEVIATIONS:
         return line
     covariance = found.covariance * _excess(line, found)
     late = found.late if found.explained >= EXPLAINED else None
     return replace(line, start=found.start, end=found.end, covariance=covariance, late=late)
-
-
-def _is_loose(found: CoherentLine, line: FittedLine, resolution: Resolution) -> bool:
-    """Tell whether the echo hardly tells where a line is: there is nothing to learn from it."""
-    deviations = np.sqrt(np.diag(found.covariance)) * [0.5 * line.length, 1.0]
-    return bool(deviations.max() > LOOSE * float(resolution.cell(line.middle, line.normal)))
 
 
 def _change(line: FittedLine, moved: CoherentLine) -> Float[np.ndarray, " 2"]:

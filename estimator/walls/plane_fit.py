@@ -13,7 +13,7 @@ along n: otherwise every change of the brightness along the wall would shift the
 covariance is the cluster-robust one ("sandwich") over tiles of the wall with independent speckle.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.ndimage
@@ -103,6 +103,8 @@ class FittedPlane:
     background: float  # mean intensity of parallel planes beside it [-]
     area: float  # that is seen [cells]
     confidence: float  # one minus the probability that background alone does this
+    orders: Float[np.ndarray, " orders"] = field(default_factory=lambda: np.ones(1))
+    """How probable it is that it stands there, or farther by c/2Δf, 2 c/2Δf, ... [-]"""
 
 
 def plane_axes(normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "2 3"]:

@@ -15,7 +15,7 @@ from estimator.imaging.range_compression import RangeProfiles
 from estimator.imaging.survey_2d import REFLECTED, Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines
-from estimator.walls.fitted_line import FittedLine
+from estimator.walls.fitted_line import FittedLine, is_uncertain
 from estimator.walls.line_detection import LineCandidate, find_lines
 from estimator.walls.line_evidence import depth_of, examine, gain_by_bending, is_from_beyond
 from estimator.walls.line_extent import face_ends
@@ -69,10 +69,6 @@ LEAST_DEPTH = 3.0
 arc of sidelobes had 2.5 at most. [cells]"""
 MOST_CANDIDATES = 8
 """Most lines sought among all peaks, those with excess curvature included. [-]"""
-MOST_UNCERTAIN = 0.5
-"""Largest standard deviation of a wall's ends and of its offset: what is known no better is no line
-but scattered peaks. True walls have 0.03 at most
-(``python -m validation.experiments.thresholds walls``). [cells]"""
 LEAST_CONTRAST = 10.0
 """Least level of a wall over its surroundings: in diffuse multipath some lines through speckle are
 5 dB above it; walls at 20 dB of SNR are 40 dB above theirs. [-]"""
@@ -199,7 +195,7 @@ def _fitted(
             continue
         if _cells(line, resolution) < LEAST_CELLS:
             continue
-        if _is_uncertain(line, resolution):
+        if is_uncertain(line, resolution):
             continue
         if looked.by_range.is_beyond(_peaks_on(line, looked, coarse)):
             continue
@@ -249,7 +245,7 @@ def _faint(
             continue  # bright ones had their chance; a bright place alone draws a line to itself
         if not _is_of_waves(line, looked, coarse):
             continue
-        if _is_uncertain(line, resolution) or is_edge_on(line, half):
+        if is_uncertain(line, resolution) or is_edge_on(line, half):
             continue
         others = [*known, *found]
         if any(overlap(line, one, coarse) or overlap(one, line, coarse) for one in others):
@@ -335,12 +331,6 @@ def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine
     return kept
 
 
-def _is_uncertain(line: FittedLine, resolution: Resolution) -> bool:
-    deviations = np.sqrt(np.diag(line.covariance)) * [0.5 * line.length, 1.0]
-    cell = float(resolution.cell(line.middle, line.normal))
-    return bool(np.any(deviations > MOST_UNCERTAIN * cell))
-
-
 def _cut_where_they_cross(
     lines: Sequence[FittedLine], resolution: Resolution, plain: Focus, tapered: Focus
 ) -> list[FittedLine]:
@@ -367,7 +357,7 @@ def _cut_where_they_cross(
             continue
         shorter = fit_between(plain, tapered, start, end, resolution, trials=1)
         # What is left may be too little for a line: speckle then fits at any angle.
-        if shorter is not None and not _is_uncertain(shorter, resolution):
+        if shorter is not None and not is_uncertain(shorter, resolution):
             cut.append(replace(shorter, confidence=line.confidence))
     return cut
 

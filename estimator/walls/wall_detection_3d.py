@@ -18,7 +18,7 @@ from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_3d import PlaneWall, hidden_by, within
 from estimator.imaging.backprojection import prepare
 from estimator.imaging.focusing import focus_within
-from estimator.imaging.range_compression import range_profiles
+from estimator.imaging.range_compression import RangeProfiles
 from estimator.imaging.range_gating import gated
 from estimator.imaging.survey_3d import VolumeSurvey, lobe_origins
 from estimator.measurement.model import Echo
@@ -90,7 +90,9 @@ class Planes:
     head_on: tuple[bool, ...]  # whether the wall's own flat wave was seen
 
 
-def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Planes:
+def detect_planes(
+    echo: Echo, array: PlanarArray, looked: VolumeSurvey, profiles: RangeProfiles
+) -> Planes:
     """Find the plane walls in an echo.
 
     Parameters
@@ -101,6 +103,8 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
         Its extents.
     looked
         Its survey.
+    profiles
+        Its range profiles, not tapered.
 
     Returns
     -------
@@ -109,7 +113,7 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
     fine = planar_resolution(array, echo)
     coarse = coarse_resolution(fine)
     reach = planar_reach(array, echo, passes=2)
-    sharp = focus_within(prepare(range_profiles(echo)), reach[1])
+    sharp = focus_within(prepare(profiles), reach[1])
     found: list[FittedPlane] = []
     head_on: list[bool] = []
 
@@ -161,13 +165,18 @@ def detect_planes(echo: Echo, array: PlanarArray, looked: VolumeSurvey) -> Plane
 
 def _in_doubt(plane: FittedPlane, array: PlanarArray, fine: Resolution) -> FittedPlane:
     """Bound the confidence of a plane of which no more is seen than the array's own reflection."""
-    wall = plane.wall
-    foot = float(wall.centre @ wall.normal) * wall.normal
-    blur = FLASH_CELLS * fine.across_ray * float(np.linalg.norm(foot))
-    reach = float(np.linalg.norm(wall.corners - foot, axis=1).max())
-    if reach > array.half + blur:
+    if beyond_the_flash(plane.wall.corners, plane.wall, array, fine).any():
         return plane
     return replace(plane, confidence=min(plane.confidence, CONFIDENCE))
+
+
+def beyond_the_flash(
+    points: Float[np.ndarray, "points 3"], wall: PlaneWall, array: PlanarArray, fine: Resolution
+) -> Bool[np.ndarray, " points"]:
+    """Tell which points of a wall show more than the array's reflection in it, and its blur."""
+    foot = float(wall.centre @ wall.normal) * wall.normal
+    blur = FLASH_CELLS * fine.across_ray * float(np.linalg.norm(foot))
+    return np.asarray(np.linalg.norm(points - foot, axis=-1) > array.half + blur)
 
 
 def lobe_of_a_wall(

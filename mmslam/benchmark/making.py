@@ -13,7 +13,7 @@ from estimator.measurement.store import PARAMETERS, TRUTH
 from mmslam.benchmark.recipe import Recipe, load_recipe, space_of
 from mmslam.learning.part_store import write_part
 from mmslam.learning.stored_samples import SIGNALS
-from mmslam.output import OutputError, replacing
+from mmslam.output import OutputError, refuse_existing, replacing
 from simulator.dataset.builder import Tally, make_dataset, plan_dataset
 from simulator.dataset.provenance import package_versions
 from simulator.dataset.store import DatasetError
@@ -74,7 +74,7 @@ def make_part(
     tables = recipe.tables(part, size)
     target = folder / f"{track}-{part}.zarr"
     if target.exists():
-        raise OutputError(f"{target} exists; move it away or choose another folder")
+        raise OutputError(refuse_existing(target))
     folder.mkdir(parents=True, exist_ok=True)
     making = folder / f"{track}-{part}.making"
     whole = making / f"{tables['count']}.zarr"
@@ -98,7 +98,7 @@ def make_part(
         "samples": summary.samples,
     }
     kept = {k: v for k, v in zarr.open_group(whole, mode="r").attrs.asdict().items() if k in TOLD}
-    with replacing(target, _refuse) as new:
+    with replacing(target, refuse_existing) as new:
         write_part(
             whole,
             new,
@@ -160,7 +160,3 @@ def _check_draws(recipe: Recipe, part: str, whole: Path, size: int | None) -> No
                 f"sample {sample} of {recipe.name}-{part} was drawn again after its simulation; "
                 "this is a fault of the recipe, please report it"
             )
-
-
-def _refuse(path: Path) -> str | None:
-    return f"{path} exists; move it away or choose another folder"

@@ -12,7 +12,7 @@ from mmslam.learning.normalisation import ATTRIBUTE, normalisation_constants
 from mmslam.learning.part_store import write_part
 from mmslam.learning.room_split import split_by_room
 from mmslam.learning.stored_samples import open_root, sample_arrays
-from mmslam.output import replacing
+from mmslam.output import refuse_existing, replacing
 
 CARD = "README.md"
 
@@ -63,7 +63,7 @@ def export_hugging_face(
     else:
         divided = split_by_room(rooms[numbers], seed=seed)
         parts = {part: numbers[some] for part, some in divided.items()}
-    with replacing(folder, _refuse) as new:
+    with replacing(folder, refuse_existing) as new:
         new.mkdir()
         constants = normalisation_constants(store, parts["train"])
         kept = {path: asdict(one) for path, one in constants.items()}
@@ -93,7 +93,3 @@ def export_hugging_face(
         )
         (new / CARD).write_text(card, encoding="utf-8")
     return {part: len(some) for part, some in parts.items()}
-
-
-def _refuse(path: Path) -> str | None:
-    return f"{path} exists; move it away or choose another folder"

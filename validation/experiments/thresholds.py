@@ -34,7 +34,7 @@ import numpy as np
 from scipy.stats import binom
 
 from estimator.localization.pipeline import locate
-from estimator.walls import line_refinement, line_relations, wall_detection_2d
+from estimator.walls import fitted_line, line_refinement, line_relations, wall_detection_2d
 from simulator.simulation import simulate
 from validation.experiments.measured_scans import false_targets as targets_away
 from validation.harness.claim import Row
@@ -138,7 +138,7 @@ SCANS = (
     Scan(module="estimator.walls.line_relations", name="BESIDE", values=(1.5, 3.0)),
     Scan(module="estimator.walls.line_relations", name="BEYOND_END", values=(2.0, 8.0)),
     Scan(module="estimator.walls.line_relations", name="GOOD_PART", values=(0.2, 0.6)),
-    Scan(module="estimator.walls.wall_detection_2d", name="MOST_UNCERTAIN", values=(0.25, 1.0)),
+    Scan(module="estimator.walls.fitted_line", name="MOST_UNCERTAIN", values=(0.25, 1.0)),
     Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CONTRAST", values=(5.0, 20.0)),
     Scan(module="estimator.walls.wall_detection_2d", name="LEAST_CELLS", values=(6.0, 12.0)),
     Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
@@ -199,8 +199,8 @@ def wall_rows(name: str, walls: list[WallStatistics]) -> list[Row]:
             float(column("coherence").min()), low=wall_detection_2d.WALL_COHERENCE),
         row("wall_detection_2d.LEAST_CONTRAST: the least", "level over background",
             float(column("contrast").min()), low=wall_detection_2d.LEAST_CONTRAST),
-        row("wall_detection_2d.MOST_UNCERTAIN: deviation, the worst", "cells",
-            float(column("deviation").max()), high=wall_detection_2d.MOST_UNCERTAIN),
+        row("fitted_line.MOST_UNCERTAIN: deviation, the worst", "cells",
+            float(column("deviation").max()), high=fitted_line.MOST_UNCERTAIN),
         row("line_refinement.EXPLAINED: by the row, the least", "share",
             float(column("explained").min()), low=line_refinement.EXPLAINED),
         row("line_refinement.DISAGREEMENT: of image and echo, median", "over covariances",

@@ -9,10 +9,10 @@ from estimator.geometry.specular_chains_3d import possible_chains
 from estimator.geometry.wall_3d import PlaneWall, mirrored_about
 from estimator.imaging.range_gating import gated
 from estimator.mapping.ghost_correction import corrected_image
-from estimator.mapping.map_3d import mirrored_wall
+from estimator.mapping.map_3d import SpaceMap, mirrored_wall, other_rooms, unfold_planes
 from estimator.measurement.model import Echo, Uplink
 from estimator.walls.plane_detection import find_planes
-from estimator.walls.plane_fit import plane_axes
+from estimator.walls.plane_fit import FittedPlane, plane_axes
 from estimator.walls.wall_detection_3d import wall_of_wave
 from estimator.wavefronts.wave_fit_3d import Wavefront, towards
 
@@ -108,6 +108,46 @@ def test_a_ghost_behind_a_wall_moves_in_front_and_the_wall_stays(world: Any) -> 
     unfolded = np.abs(corrected_image(survey.at, places, [mirror], chains, skin=0.02).values)
     assert unfolded[0] == 0.0
     assert unfolded[1] == pytest.approx(raw[0], rel=1e-9)
+
+
+def test_what_is_seen_in_a_wall_that_may_stand_farther_is_unfolded_in_each_of_its_places(
+    world: Any,
+) -> None:
+    near = square(np.array([0.0, 0.4, 0.0]), np.array([0.0, -1.0, 0.0]))
+    # Seen in it, 0.2 m behind its plane.
+    ghost = square(np.array([0.05, 0.6, 0.0]), np.array([0.6, -0.8, 0.0]), half=0.05)
+    orders = np.array([0.7, 0.3])
+    planes = [
+        FittedPlane(wall=wall, level=1.0, background=1e-3, area=50.0, confidence=1.0, orders=some)
+        for wall, some in ((near, orders), (ghost, np.array([1.0, 0.0])))
+    ]
+    band = np.linspace(57e9, 64e9, 41)
+    found = unfold_planes(planes, Resolution(along_ray=2e-2, across_ray=7e-2))
+    room = SpaceMap(
+        planes=found[0],
+        walls=found[1],
+        seen_through=found[2],
+        joint_covariance=np.zeros((6, 6)),
+        targets=(),
+        unassigned_peaks=np.zeros((0, 3)),
+        survey=world.volume(np.array([0.0, 0.4, 0.0]), 0.05, np.linspace(0.2, 0.8, 61)),
+    )
+    assert room.seen_through == ((), (0,))
+    echo = Echo(
+        samples=np.ones((4, band.size), dtype=complex),
+        positions=np.array(
+            [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.01], [0.01, 0.0, 0.01]]
+        ),
+        frequencies=band,
+    )
+    (likely, here), (other, there) = other_rooms(room, echo)
+    assert (likely, other) == (pytest.approx(0.7), pytest.approx(0.3))
+    assert here == room.walls
+    step = speed_of_light / (2 * 175e6)
+    np.testing.assert_allclose(there[0].centre, [0.0, 0.4 + step, 0.0])
+    np.testing.assert_allclose(room.walls[1].centre, [0.05, 0.2, 0.0], atol=1e-12)
+    # Before the farther one it is no image.
+    np.testing.assert_allclose(there[1].centre, ghost.centre, atol=1e-12)
 
 
 def test_a_gate_keeps_what_is_near_and_drops_what_is_far() -> None:

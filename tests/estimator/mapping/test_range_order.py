@@ -9,6 +9,7 @@ from scipy.constants import speed_of_light
 
 from estimator.array.planar_array import planar_array
 from estimator.geometry.wall_3d import PlaneWall
+from estimator.imaging.range_compression import range_profiles
 from estimator.mapping.range_order import (
     farther,
     order_probabilities,
@@ -50,7 +51,14 @@ def reflection(distance: float, coefficient_db: float) -> Echo:
 
 def orders_of(echo: Echo, wall: PlaneWall, peaks: Any = None, *, flat: bool = True) -> Any:
     found = np.zeros((0, 3)) if peaks is None else peaks
-    return order_probabilities(wall, found, echo, planar_array(echo.positions), flat_wave=flat)
+    return order_probabilities(
+        wall,
+        found,
+        echo,
+        planar_array(echo.positions),
+        flat_wave=flat,
+        profiles=range_profiles(echo),
+    )
 
 
 def test_the_reflection_alone_leaves_a_wall_at_several_distances() -> None:

@@ -13,6 +13,7 @@ import zarr
 from typer.testing import CliRunner
 
 from estimator.measurement.model import MeasurementError
+from estimator.measurement.store import read_measurement
 from mmslam.benchmark import find_mirrors, predict_channel
 from mmslam.benchmark import recipe as recipes
 from mmslam.benchmark.bootstrap import metric, quantile
@@ -130,6 +131,8 @@ def test_the_test_part_holds_inputs_and_no_answer(parts: Path, track: str) -> No
     assert ("uplink" in names) == (track == "user")
     assert ("user_position" in names) == (track == "channel")
     assert "echo" in names
+    # Without it the users' clock would be unknown, and no delay a length.
+    assert read_measurement(parts / f"{track}-test.zarr", sample=0).clock_offset == 0.0
 
 
 def test_a_training_part_holds_its_truth(tmp_path: Path) -> None:
