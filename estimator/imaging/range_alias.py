@@ -23,6 +23,7 @@ from estimator.array.resolution_cell import Resolution
 from estimator.imaging.phase_curvature import (
     RANGE_SHIFTS,
     SHIFTS,
+    TILTS,
     aligned_profiles,
     over_half_aperture,
 )
@@ -122,7 +123,7 @@ def focus_by_range(
         Of the echo.
     """
     middles = np.mean(profiles.legs, axis=0)
-    tilts = _tilts(profiles, middles)
+    about, aside = (_tilts(profiles, middles, cells) for cells in (SHIFTS, TILTS))
     wavenumber = 2 * np.pi * profiles.carrier / speed_of_light
     reach = np.linalg.norm(points, axis=-1, keepdims=True)
     # Of a path of `passes` legs each way; a monostatic echo's profiles end at twice c/2Δf.
@@ -134,7 +135,9 @@ def focus_by_range(
     best = np.zeros((len(lengths), len(points)))
     for shift in RANGE_SHIFTS:
         aligned = aligned_profiles(profiles, points, shift * resolution.along_ray)
-        for trial, length in zip(best, lengths, strict=True):
+        for order, (trial, length) in enumerate(zip(best, lengths, strict=True)):
+            # A reflection is as wide as the array, and has its peaks beside its direction.
+            tilts = aside if order > ORDERS else about
             turned = aligned * np.exp(1j * wavenumber * (length - lengths[0]))
             focused = np.abs(np.einsum("pm,tm->pt", turned, tilts)) ** 2
             np.maximum(trial, focused.max(axis=1), out=trial)
@@ -178,14 +181,16 @@ def brightest_from_beyond(
 
 
 def _tilts(
-    profiles: RangeProfiles, middles: Float[np.ndarray, "channels 3"]
+    profiles: RangeProfiles,
+    middles: Float[np.ndarray, "channels 3"],
+    cells: Float[np.ndarray, " beside"],
 ) -> Complex[np.ndarray, "tilts channels"]:
-    """Return the phases over an array of waves from beside a peak, as far as its pixel is wide."""
-    along: np.ndarray = np.exp(1j * np.pi * SHIFTS[:, None] * over_half_aperture(profiles))
+    """Return the phases over an array of waves from some cells beside a peak."""
+    along: np.ndarray = np.exp(1j * np.pi * cells[:, None] * over_half_aperture(profiles))
     if not spans_a_plane(middles):
         return along
     height = middles[:, 2] - middles[:, 2].mean()
-    up = np.exp(1j * np.pi * SHIFTS[:, None] * height / (0.5 * np.ptp(height)))
+    up = np.exp(1j * np.pi * cells[:, None] * height / (0.5 * np.ptp(height)))
     return np.asarray((along[:, None] * up).reshape(-1, len(middles)))
 
 

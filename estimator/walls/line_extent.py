@@ -34,6 +34,11 @@ C = 10; of a few unconnected glints little is. [-]"""
 END_LEVEL = 0.1
 """Intensity over the wall's local mean that still is wall: speckle falls below it in one cell
 of ten, and the tapered main lobe reaches it 0.8 cells beyond an end. [-]"""
+WALL_LEVEL = 3.0
+"""Level over what is beside it of the faintest wall that is followed to its ends: parts 2.2 dB over
+the background are kept. With 10, of faint walls the brightest part alone was left, and stood out as
+a wall of its own; with 3 as with 10 the end of a wall at 0 dB of SNR, which had been found 20 cells
+too far, was found within 2 (judging room 356 of ``plain``). [-]"""
 STEPS_OUT = 2
 """Lengths :data:`CELLS_OF_STEP` before the highest step in which the wall may already begin: a
 minimum of the speckle may be a higher step. [-]"""
@@ -76,9 +81,43 @@ def lit_extent(
     outermost = len(places) - 1
     first = end_of(level_db, int(run[0]))
     last = outermost - end_of(level_db[::-1], outermost - int(run[-1]))
+    first, last = likeliest_part(intensity, first, last, background)
     if last - first < 2:
         return None
     return middle + places[first] * along, middle + places[last] * along
+
+
+def likeliest_part(
+    intensity: Float[np.ndarray, " places"], first: int, last: int, background: float
+) -> tuple[int, int]:
+    r"""Return the first and the last place of the part of a line that is likeliest wall.
+
+    Places of a wall that is m times as bright as what is beside it, and of what is beside it, are
+    exponential variables; the sum of the logarithms of their likelihood ratio,
+
+    .. math:: \frac{I}{b}\Bigl(1 - \frac1m\Bigr) - \ln m ,
+
+    over a part of the line is largest between the wall's ends (Page 1954, doi:10.2307/2333009). In
+    noise a line is followed from one bright place to the next, tens of cells beyond its wall.
+
+    Parameters
+    ----------
+    intensity
+        Along the line.
+    first, last
+        The part to be searched.
+    background
+        Mean intensity b beside the line.
+    """
+    if background <= 0:
+        return first, last
+    over = intensity[first : last + 1] / background
+    gains = over * (1 - 1 / WALL_LEVEL) - np.log(WALL_LEVEL)
+    sums = np.concatenate([[0.0], np.cumsum(gains)])
+    rises = sums - np.minimum.accumulate(sums)
+    stop = int(np.argmax(rises))
+    begin = int(np.argmin(sums[: stop + 1]))
+    return first + begin, first + stop - 1
 
 
 def end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:

@@ -10,9 +10,9 @@ from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing
-from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
+from estimator.imaging.focusing import Focus, PreparedEcho, compressed, focus_within
 from estimator.imaging.range_compression import RangeProfiles
-from estimator.imaging.survey_2d import REFLECTED, Survey
+from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
 from estimator.walls.faint_lines import find_faint_lines
 from estimator.walls.fitted_line import FittedLine, is_uncertain
@@ -233,16 +233,14 @@ def _faint(
     found: list[FittedLine] = []
     taken = [LineCandidate(start=one.start, end=one.end, inliers=0) for one in known]
     for candidate in find_faint_lines(looked, taken, coarse):
-        line = fit_between(
-            plain, tapered, candidate.start, candidate.end, resolution, trials=trials
-        )
+        line = _evenly_fitted(candidate, plain, tapered, resolution, trials)
         if line is None or line.confidence < LEAST_CONFIDENCE:
             continue
         if line.background > MOST_NOISE * looked.background:
             continue
         usual = median_level(tapered, line.start, line.end, resolution)
-        if usual > RIDGE_LEVEL * line.background or line.level > MOST_UNEVEN * usual:
-            continue  # bright ones had their chance; a bright place alone draws a line to itself
+        if usual > RIDGE_LEVEL * line.background:
+            continue  # bright ones had their chance
         if not _is_of_waves(line, looked, coarse):
             continue
         if is_uncertain(line, resolution) or is_edge_on(line, half):
@@ -258,6 +256,22 @@ def _faint(
             continue  # along an arc of sidelobes; a wall that nearly faces the array is not faint
         found.append(replace(line, explained=0.0))
     return found
+
+
+def _evenly_fitted(
+    candidate: LineCandidate, plain: Focus, tapered: Focus, resolution: Resolution, trials: int
+) -> FittedLine | None:
+    """Fit a faint line between its ends, its bright places compressed if it is uneven.
+
+    A post before a wall draws the line to itself, or to where no maximum is.
+    """
+    ends = candidate.start, candidate.end
+    line = fit_between(plain, tapered, *ends, resolution, trials=trials)
+    usual = [median_level(one, *ends, resolution) for one in (plain, tapered)]
+    if line is not None and line.level <= MOST_UNEVEN * usual[1]:
+        return line
+    even, low = (compressed(one, usual[k]) for k, one in enumerate((plain, tapered)))
+    return fit_between(even, low, *ends, resolution, trials=trials)
 
 
 def _fitted_line(
@@ -306,8 +320,7 @@ def _peaks_on(line: FittedLine, looked: Survey, coarse: Resolution) -> Bool[np.n
 
 def _reflects(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
     """Tell whether the array is seen reflected in a line."""
-    on = _peaks_on(line, looked, coarse)
-    return bool(np.any(looked.as_mirror[on] >= REFLECTED))
+    return bool(np.any(looked.reflected[_peaks_on(line, looked, coarse)]))
 
 
 def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
@@ -317,9 +330,8 @@ def _is_of_waves(line: FittedLine, looked: Survey, coarse: Resolution) -> bool:
         return True
     if np.mean(looked.bent[on]) > MOST_BENT:
         return False
-    reflects = bool(np.any(looked.as_mirror[on] >= REFLECTED))
     coherent = np.maximum(looked.as_point, looked.as_mirror)[on]
-    return reflects or float(np.median(coherent)) >= WALL_COHERENCE
+    return bool(looked.reflected[on].any()) or float(np.median(coherent)) >= WALL_COHERENCE
 
 
 def _best_of(lines: Sequence[FittedLine], coarse: Resolution) -> list[FittedLine]:

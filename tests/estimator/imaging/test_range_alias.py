@@ -55,6 +55,23 @@ def test_a_flat_wave_is_of_no_point_beyond(world: Any) -> None:
     assert not found.is_beyond(np.array([True]))
 
 
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_the_reflection_of_a_part_of_the_array_is_of_no_point_beyond(
+    share: float, world: Any
+) -> None:
+    # Its peaks lie beside its direction, by more than half a cell: there a wave from beyond, which
+    # is bent, seemed to fit where a flat one was tried in the peak's own direction alone.
+    rng = np.random.default_rng(4)
+    positions = world.array(96)
+    lit = np.arange(96) < share * 96
+    ways = 2 * (0.25 + np.sin(np.radians(10.0)) * positions[:, 0])
+    waves = np.exp(-2j * np.pi * world.band / speed_of_light * ways[:, None]) * lit[:, None]
+    noisy = world.noisy(waves, 20.0, rng)
+    looked = survey(Echo(samples=noisy, positions=positions, frequencies=world.band))
+    assert looked.reflected[0]
+    assert not looked.beyond[0]
+
+
 def test_a_wall_beyond_the_unambiguous_range_is_no_mirror_nearby(world: Any) -> None:
     rng = np.random.default_rng(1)
     near = world.echo(world.rough_line((0.0, 0.25), 30.0, 0.12, rng), rng)

@@ -44,6 +44,21 @@ def test_a_faint_wall_is_a_mirror(world: Any) -> None:
     assert abs(turn) < 4 * np.sqrt(wall.covariance[0, 0])
 
 
+def test_a_post_before_a_faint_wall_does_not_draw_the_line_to_itself(world: Any) -> None:
+    rng = np.random.default_rng(3)
+    shares = rng.random((1500, 1))
+    ends = np.concatenate([np.repeat(one[None], 300, axis=0) for one in (START, END)])
+    # 4 mm aside of the middle, 30 dB above the wall's own places.
+    along = (END - START) / np.linalg.norm(END - START)
+    post = 0.5 * (START + END) + 0.004 * np.array([along[1], -along[0], 0.0])
+    points = [START + shares * (END - START), ends, np.repeat(post[None], 3000, axis=0)]
+    echo = world.echo(np.concatenate(points), rng, snr_db=-14.0)
+    (wall,) = detect_mirrors(echo, survey(echo))
+    turn = np.cross(wall.direction, along)[2]
+    assert abs(turn) < 4 * np.sqrt(wall.covariance[0, 0])
+    assert abs(float((wall.middle - START) @ wall.normal)) < 1e-3
+
+
 def test_noise_and_bright_points_have_no_faint_lines(world: Any) -> None:
     for seed in range(4):
         rng = np.random.default_rng(seed)

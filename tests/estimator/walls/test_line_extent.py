@@ -12,7 +12,7 @@ from estimator.imaging.focusing import focus_within
 from estimator.imaging.range_compression import range_profiles
 from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
-from estimator.walls.line_extent import face_ends
+from estimator.walls.line_extent import face_ends, likeliest_part
 
 FAR = 0.33
 FACE = -0.02, 0.01  # within what the array of 5 cm sees in reflection
@@ -74,3 +74,27 @@ def test_what_no_antenna_sees_in_reflection_is_no_end(world: Any) -> None:
     line, (start, end) = ends(world, (-0.05, 0.05), 0.0, face=(-0.05, 0.05))
     assert start is line.start
     assert end is line.end
+
+
+@pytest.mark.parametrize("level", [10.0, 100.0])
+def test_of_a_line_in_noise_the_likeliest_part_is_the_wall(level: float) -> None:
+    rng = np.random.default_rng(11)
+    errors = []
+    for _ in range(200):
+        intensity = rng.exponential(1.0, 140)
+        intensity[50:90] *= level
+        first, last = likeliest_part(intensity, 10, 130, 1.0)
+        errors.append([first - 50, last - 89])
+    # A wall's last places may be dark: one in six at 10 dB is no brighter than 2.2 dB over the
+    # noise, and a place of noise is so bright with exp(-1.65) = 19 %.
+    assert np.median(np.abs(errors)) <= 1
+    assert np.mean(np.abs(errors) > 6) < 0.05
+
+
+def test_a_part_without_anything_beside_it_is_left_as_it_is() -> None:
+    assert likeliest_part(np.ones(20), 3, 15, 0.0) == (3, 15)
+    # A wall whose level falls by 40 dB along it is wall to where it is 2.2 dB over the noise.
+    falling = 10 ** np.linspace(4.0, 0.0, 81)
+    first, last = likeliest_part(falling, 0, 80, 1.0)
+    assert first == 0
+    assert 10 * np.log10(falling[last]) == pytest.approx(2.2, abs=0.6)
