@@ -21,6 +21,7 @@ from estimator.positioning.map_context import MapContext
 from estimator.positioning.position_report import ambiguous, path_reports, placed
 from estimator.positioning.posterior import (
     CERTAIN,
+    beside,
     chain_probabilities,
     log_weight,
     strong_unexplained,
@@ -111,7 +112,7 @@ def _decided(
     best, probability = places[0]
     answer = placed(name, consistent[best], found, room, chains)
     assert answer.covariance is not None
-    spread = _spread(consistent, weights, best, found.how)
+    spread = _spread(consistent, weights, best, found, room)
     answer = replace(answer, covariance=answer.covariance + spread, probability=probability)
     if probability >= CERTAIN:
         return answer
@@ -178,21 +179,48 @@ def _places(
 
 
 def _spread(
-    consistent: Sequence[Consensus], weights: Float[np.ndarray, " weights"], best: int, how: Bearing
+    consistent: Sequence[Consensus],
+    weights: Float[np.ndarray, " weights"],
+    best: int,
+    found: PathSet,
+    room: MapContext,
 ) -> Float[np.ndarray, "3 3"]:
     """Return how far explanations of one place lie apart, weighted, as a covariance. [m²].
 
     Two waves that describe one front, bent by roughness, end at places that neither's covariance
-    tells the distance of.
+    tells the distance of. Each is as likely as its share of their energy: the front's direction is
+    that of the patches of the mirror that contribute most, by chance.
     """
-    alike = [
-        index
-        for index, one in enumerate(consistent)
-        if index == best or same_place(consistent[best], one, how)
-    ]
-    away = np.array([consistent[index].position - consistent[best].position for index in alike])
-    shares = weights[alike] / weights[alike].sum()
-    return np.asarray(np.einsum("p,px,py->xy", shares, away, away))
+    chosen = consistent[best]
+    weighed = weights[best]
+    spread = np.zeros((3, 3))
+    parts = np.zeros((3, 3))
+    for index, one in enumerate(consistent):
+        if index == best:
+            continue
+        away = one.position - chosen.position
+        if same_place(chosen, one, found.how):
+            weighed += weights[index]
+            spread += weights[index] * np.outer(away, away)
+        elif (share := _share_of_part(one, chosen, found, room)) > 0:
+            parts += share * np.outer(away, away)
+    return np.asarray(spread / weighed + parts)
+
+
+def _share_of_part(one: Consensus, other: Consensus, found: PathSet, room: MapContext) -> float:
+    """Return the share of energy of one explanation's path, if both are parts of one front.
+
+    Of a direct wave's front there are none: nothing bends it.
+    """
+    if len(one.sightings) != 1 or len(other.sightings) != 1:
+        return 0.0
+    (part,), (rest,) = one.sightings, other.sightings
+    if not part.chain or part.chain != rest.chain:
+        return 0.0
+    if not beside(found.paths[part.path], found.paths[rest.path], room):
+        return 0.0
+    shares = found.paths[part.path].share, found.paths[rest.path].share
+    return shares[0] / sum(shares)
 
 
 def _ordered(chances: Mapping[Chain, float]) -> tuple[Chain, ...]:
