@@ -125,7 +125,6 @@ class Scenario(Checked):
                 objects=self.objects,
             ),
             *_sample_problems(self),
-            *_effect_problems(self),
         ]
         found = found or file_problems(
             self.objects, self.radio.frequencies, flat=self.dimensions == 2
@@ -301,15 +300,6 @@ def _aim_problems(scenario: Scenario) -> list[str]:
         except ScenarioError as error:
             found.append(f"{key}: {error}")
     return found
-
-
-def _effect_problems(scenario: Scenario) -> list[str]:
-    if not scenario.effects.diffraction or scenario.dimensions == 2:
-        return []
-    return [
-        "effects.diffraction = true: known in two dimensions only, and dimensions = 3; "
-        "set it to false"
-    ]
 
 
 def _sample_problems(scenario: Scenario) -> list[str]:

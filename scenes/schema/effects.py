@@ -17,5 +17,5 @@ class Effects(Checked):
     )
     diffraction: bool = Field(
         False,
-        description="whether pilots bend round edges of opaque plates and boxes (2-D scenes only)",
+        description="whether pilots bend round edges of opaque plates and boxes",
     )

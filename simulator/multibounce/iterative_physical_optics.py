@@ -20,7 +20,8 @@ path of mean length, the field varies slowly with frequency.
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Complex64, Float, Float32, Int
@@ -32,6 +33,7 @@ from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
 from simulator.materials.insertion_table import InsertionTable
 from simulator.materials.reflection_table import Angles, reflection_table
+from simulator.multibounce.links_through_slabs import BlockInsertions, SlabVariation
 from simulator.multibounce.rough_faces import half_angle_cosines, rough_sources
 from simulator.numerics.butterfly import LinkPlan, phasor, plan_links, sum_planned
 from simulator.visibility.mutual_visibility import Sight
@@ -142,13 +144,7 @@ def direct(face: Face, ports: Ports, nodes: Float[np.ndarray, " nodes"]) -> Wave
     distance = np.sqrt(np.einsum("pfx,pfx->pf", towards, towards))
     cosine = np.einsum("pfx,fx->pf", towards, face.normals) / distance
     lit = ports.visible[:, face.source] & (cosine > 0)
-    outward = np.zeros((face.count, 3))
-    gains = []
-    for index in range(len(ports.positions)):
-        outward[:, :2] = -towards[index] / distance[index, :, None]
-        gains.append(ports.pattern(outward, distance[index], nodes))
-    gain = np.stack(gains, axis=1)
-    strength = (gain * np.where(lit, 1 / np.sqrt(distance), 0.0)).astype(np.complex64)
+    strength = _direct_strength(ports, towards, distance, lit, nodes)
     length = np.where(lit, distance, 0.0)
     origins = np.broadcast_to(ports.positions[:, None, :2], towards.shape)
     return Wave(
@@ -156,6 +152,29 @@ def direct(face: Face, ports: Ports, nodes: Float[np.ndarray, " nodes"]) -> Wave
         slope=strength * cosine.astype(np.float32),
         bounds=Bounds(shortest=length, longest=length, origins=origins),
     )
+
+
+def _direct_strength(
+    ports: Ports,
+    towards: Float[np.ndarray, "ports facets 2"],
+    distance: Float[np.ndarray, "ports facets"],
+    lit: Bool[np.ndarray, "ports facets"],
+    nodes: Float[np.ndarray, " nodes"],
+) -> Complex64[np.ndarray, "#nodes ports facets"]:
+    """Return the ports' patterns over the spreading at the facets that they illuminate."""
+    rows = len(ports.pattern(np.array([[0.0, 1.0, 0.0]]), np.ones(1), nodes))
+    strength = np.zeros((rows, *lit.shape), np.complex64)
+
+    def of_port(port: int) -> None:
+        some = np.flatnonzero(lit[port])
+        outward = np.zeros((some.size, 3))
+        outward[:, :2] = -towards[port, some] / distance[port, some, None]
+        gain = ports.pattern(outward, distance[port, some], nodes)
+        strength[:, port, some] = gain / np.sqrt(distance[port, some])
+
+    with ThreadPoolExecutor(thread_count()) as pool:  # each port by one thread
+        list(pool.map(of_port, range(len(lit))))
+    return strength
 
 
 def onward_bounds(
@@ -234,10 +253,10 @@ def onward(
     towards = target.centres[seen.any(axis=0)].mean(axis=0)
     table = reflection_table(wall.material, nodes, polarization=wall.polarization)
     incidence = table.places(half_angle_cosines(wall, wave.bounds.origins, towards))
-    plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]))
-    if sight.crossings:  # each pair of facets has its own angle at the slabs
-        plan = replace(plan, pairs=(), left=seen, by_sender={}, by_receiver={})
     slabs = [InsertionTable.of(one, nodes, wall.polarization) for one in sight.crossings]
+    variation = SlabVariation(slabs) if slabs else None
+    plan = plan_links(wall.centres, target.centres, seen, float(nodes[-1]), variation=variation)
+    between = BlockInsertions.of(plan, slabs)
     single = _SingleLinks.left_by(plan, wall, target, slabs)
     sizes, outward, inward = (
         values.astype(np.float32) for values in (wall.sizes, wall.normals, target.normals)
@@ -262,7 +281,10 @@ def onward(
         if across is not None:
             sources[1] += across * aside[:, 0]
             sources[2] += across * aside[:, 1]
-        field, from_x, from_y = sum_planned(plan, sources, columns, frequency)
+        inserted = None
+        if between is not None:
+            inserted = partial(between.at, node=node, per_metre=frequency / speed_of_light)
+        field, from_x, from_y = sum_planned(plan, sources, columns, frequency, inserted)
         along_normal = inward[:, 0] * from_x + inward[:, 1] * from_y
         for some in single:
             sideways = None if across is None else across[:, some.rows]

@@ -53,6 +53,9 @@ WAVE_BYTES = 2**29
 FACETS_AT_ONCE = 1500
 """Most facets of a target in one block. [-]"""
 
+FEWEST_PORTS = 8
+"""Ports in one block, if memory allows: what a link costs by itself is shared among them. [-]"""
+
 SeveralProgress = Callable[[int, int], None]
 """Called with the work done and the work in all. [-]"""
 
@@ -236,11 +239,19 @@ def _echo_of(
     total = _few_frequencies(target, links, frequencies, interpolate)
     passages = _passages_of(links)
     ports_of = {id(link.back): link.back for link in links if isinstance(link.back, Ports)}
-    # Waves at walls after the first vary with frequency; those at the first take little memory.
-    held = sum(one.walls[-1].count for one in passages.values() if len(one.walls) > 1)
+    # Waves at walls after the first vary with frequency, and so do those that came through slabs;
+    # others at the first take little memory.
+    held = sum(
+        one.walls[-1].count
+        for one in passages.values()
+        if len(one.walls) > 1 or one.ports.nodes > 1
+    )
     ports, at_once = len(array.positions), max(1, WAVE_BYTES // (16 * total.nodes.size))
-    for row in range(0, ports, max(1, at_once // max(1, held))):
-        rows = slice(row, min(row + max(1, at_once // max(1, held)), ports))
+    # Each block of facets takes the walls' waves anew: few ports at many facets, not the reverse.
+    wanted = len(passages) * min(target.count, FACETS_AT_ONCE)
+    together = min(max(FEWEST_PORTS, at_once // max(1, wanted)), max(1, at_once // max(1, held)))
+    for row in range(0, ports, together):
+        rows = slice(row, min(row + together, ports))
         antennas = {key: one.part(rows) for key, one in ports_of.items()}
         some = {key: one.of_ports(rows) for key, one in passages.items()}
         sent = {key: one.at_last_wall(total.nodes) for key, one in some.items()}

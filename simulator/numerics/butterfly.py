@@ -17,7 +17,7 @@ doi:10.1137/080734339). Links between blocks that are close, or see each other o
 summed one by one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,6 +75,14 @@ class BlockPair:
     directions: Float32[np.ndarray, "2 points others"]
 
 
+Variation = Callable[[Float[np.ndarray, "n 2"]], int]
+"""Points along an axis that something between two blocks needs beyond those of free space, from
+unit vectors that span the directions of their links. [-]"""
+
+Inserted = Callable[[BlockPair], Complex64[np.ndarray, "from to"]]
+"""Factor of something between the points of two blocks. [-]"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkPlan:
     """Division of the links between two faces into block pairs, up to a highest frequency."""
@@ -92,6 +100,8 @@ def plan_links(
     target: Float[np.ndarray, "target 2"],
     seen: Bool[np.ndarray, "wall target"],
     highest: float,
+    *,
+    variation: "Variation | None" = None,
 ) -> LinkPlan:
     """Divide two faces into blocks, and select block pairs of low rank.
 
@@ -103,6 +113,8 @@ def plan_links(
         Which of them see each other.
     highest
         Highest frequency. [Hz]
+    variation
+        Points that what is between the faces needs, from the directions of links; None: nothing.
     """
     wavenumber = 2 * np.pi * highest / speed_of_light
     apart = float(np.linalg.norm(wall.mean(axis=0) - target.mean(axis=0)))
@@ -121,7 +133,8 @@ def plan_links(
             if sends.any() and whole and _far(one, other):
                 chosen.append((i, j, sends, hears))
     counts = [
-        _point_counts(boxes[side], boxes[1 - side], chosen, side, wavenumber) for side in (0, 1)
+        _point_counts(boxes[side], boxes[1 - side], chosen, side, wavenumber, variation)
+        for side in (0, 1)
     ]
     blocks = [
         tuple(box.block(count) for box, count in zip(boxes[side], counts[side], strict=True))
@@ -145,6 +158,7 @@ def sum_planned(
     sources: Complex64[np.ndarray, "3 ports wall"],
     targets: int,
     frequency: float,
+    inserted: "Inserted | None" = None,
 ) -> Complex64[np.ndarray, "3 ports target"]:
     r"""Sum the fields that blocks radiate to blocks at one frequency.
 
@@ -159,6 +173,8 @@ def sum_planned(
         Number of receiving facets.
     frequency
         [Hz].
+    inserted
+        Factor of what is between two blocks' points at this frequency; None: free space.
 
     Returns
     -------
@@ -180,7 +196,9 @@ def sum_planned(
             sent.reshape(3, ports, len(pairs), points).transpose(2, 1, 0, 3)
         ).reshape(len(pairs), ports, 3 * points)
         for place, pair in enumerate(pairs):
-            arriving[pair.sender, pair.receiver] = sent[place] @ _point_links(pair, per_metre)
+            arriving[pair.sender, pair.receiver] = sent[place] @ _point_links(
+                pair, per_metre, inserted
+            )
     for index, pairs in plan.by_receiver.items():
         block = plan.receivers[index]
         points = len(block.points)
@@ -197,9 +215,13 @@ def sum_planned(
     return received
 
 
-def _point_links(pair: BlockPair, per_metre: float) -> Complex64[np.ndarray, "from to"]:
+def _point_links(
+    pair: BlockPair, per_metre: float, inserted: "Inserted | None"
+) -> Complex64[np.ndarray, "from to"]:
     """Return the matrix of two blocks' points: monopole and dipole to field and directions."""
     link = pair.spreading * phasor(-per_metre * pair.mixed)
+    if inserted is not None:
+        link = link * inserted(pair)
     ones = np.ones_like(link.real)[None]
     sent = np.concatenate([ones, pair.directions])
     heard = np.concatenate([ones, -pair.directions])
@@ -299,11 +321,12 @@ def _point_counts(
     chosen: Sequence[tuple[int, int, np.ndarray, np.ndarray]],
     side: int,
     wavenumber: float,
+    variation: "Variation | None",
 ) -> list[tuple[int, int]]:
     """Return the points along both axes of each box that suffice for all its linked boxes."""
     counts = []
     for index, box in enumerate(boxes):
-        phases = np.zeros(2)
+        phases, added = np.zeros(2), 0
         for link in chosen:
             one, far = (link[0], link[1]) if side == 0 else (link[1], link[0])
             if one != index:
@@ -315,8 +338,11 @@ def _point_counts(
             middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
             turned = np.abs((towards - middle) @ box.axes.T).max(axis=(0, 1))
             phases = np.maximum(phases, wavenumber * box.half * turned)
+            if variation is not None:
+                ways = towards.reshape(-1, 2)
+                added = max(added, variation(ways))
         # Across a nearly flat box spreading and directions are constant.
-        more = AMPLITUDE_POINTS * (box.half > FLAT * box.half.max())
+        more = (AMPLITUDE_POINTS + added) * (box.half > FLAT * box.half.max())
         first, second = (
             _nodes_for(float(phase)) + int(extra) for phase, extra in zip(phases, more, strict=True)
         )

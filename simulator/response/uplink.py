@@ -14,6 +14,7 @@ from simulator.multibounce.multibounce_3d import coherent_pilot
 from simulator.response.direct_pilot import direct_pilot
 from simulator.response.over_one_surface import over_one_surface
 from simulator.response.round_edges import pilot_round_edges
+from simulator.response.round_edges_3d import pilot_round_edges_3d
 from simulator.response.single_bounce_3d import scattered_in_space
 from simulator.scene.array_antennas import array_group, in_space, user_group
 from simulator.scene.radio_scene import RadioScene, facet_ports
@@ -51,6 +52,9 @@ def simulate_uplink(
     S-parameter at each element (cylindrical waves: field). [-]
     """
     pilot: np.ndarray = direct_pilot(scene, user)
+    if scene.scenario.effects.diffraction:
+        flat = scene.scenario.dimensions == 2
+        pilot = pilot + (pilot_round_edges if flat else pilot_round_edges_3d)(scene, user)
     if in_space(scene.scenario):
         name = next(name for name, one in scene.scenario.users.items() if one is user)
         sender, array_there = (
@@ -61,8 +65,6 @@ def simulate_uplink(
         over_more_there = coherent_pilot(scene, sender, array_there)
         over_more_there += _diffuse_over_mirrors(scene, sender, array_there)
         return np.asarray(pilot + over_one + over_more_there)
-    if scene.scenario.effects.diffraction:
-        pilot = pilot + pilot_round_edges(scene, user)
     if array is None or scene.facets is None:
         return pilot
     port = facet_ports(scene, scene.facets, user.antenna, user.position[None, :])

@@ -41,7 +41,7 @@ def transition(x: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
 def wedge_coefficient(
     incident: float,
     outgoing: Float[np.ndarray, " places"],
-    before: float,
+    before: float | Float[np.ndarray, " places"],
     beyond: Float[np.ndarray, " places"],
     wavenumbers: Float[np.ndarray, " freqs"],
     *,
@@ -55,7 +55,8 @@ def wedge_coefficient(
     incident, outgoing
         Angles to both ends from the wedge's first face, through the air. [rad]
     before, beyond
-        Distances of both ends from the edge. [m]
+        Distances of both ends from the edge; in space times the squared sine of the angle between
+        ray and edge. [m]
     wavenumbers
         [1/m]
     exterior

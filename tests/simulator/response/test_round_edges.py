@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from scenes.scenario import Scenario, ScenarioError, parse_scenario
+from scenes.scenario import Scenario, parse_scenario
 from simulator.simulation import simulate
 from validation.analytic.half_plane import fresnel_tail, half_plane_over_free_space
 
@@ -80,17 +80,3 @@ def test_behind_an_absorbing_screen_the_field_is_fresnels() -> None:
     expected = np.abs(fresnel_tail(np.sqrt(np.pi / 2) * v))
     # Up to 10 cm off: the detour is that of Fresnel's parabola within 2 %.
     assert np.abs(20 * np.log10(ratio / expected)).max() <= 0.5
-
-
-def test_in_space_waves_do_not_bend_round_edges() -> None:
-    with pytest.raises(ScenarioError, match=r"effects.diffraction = true: .* set it to false"):
-        parse_scenario(
-            {
-                "name": "made",
-                "dimensions": 3,
-                "radio": {"start_ghz": 27.5, "stop_ghz": 28.5, "points": 3},
-                "base_station": {"elements": 1, "spacing_mm": 10.0},
-                "users": {"user": {"position_m": [0.0, 1.0]}},
-                "effects": {"diffraction": True},
-            }
-        )
