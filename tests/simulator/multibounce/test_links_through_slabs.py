@@ -1,5 +1,7 @@
 """Links through slabs summed by blocks, against each link by itself."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.constants import speed_of_light
@@ -51,7 +53,7 @@ def test_blocks_send_through_slabs_what_their_facets_send(
             sources,
             len(TARGET),
             float(NODES[node]),
-            lambda pair, node=node, per_metre=per_metre: inserted.at(pair, node, per_metre),
+            partial(inserted.at, node=node, per_metre=per_metre),
         )
         longer = sum(one.bending(ways, distance) for one in tables)
         turns = (distance + longer) * per_metre
