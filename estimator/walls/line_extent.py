@@ -9,14 +9,14 @@ them. Without the taper a face is as bright at its ends as in its middle.
 import numpy as np
 from jaxtyping import Float
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimator.array.resolution_cell import Resolution
 from estimator.imaging.focusing import Focus
 from estimator.imaging.peak_detection import mean_background
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_detection import GAP
-from estimator.walls.line_sampling import SAMPLES_PER_CELL, cell_along, levels
+from estimator.walls.line_sampling import BESIDE, SAMPLES_PER_CELL, cell_along, levels
 
 CELLS_AT_END = 12.0
 """Distance to either side of a wall's rough end that is searched for it: a dim shoulder
@@ -81,15 +81,14 @@ def lit_extent(
     outermost = len(places) - 1
     first = end_of(level_db, int(run[0]))
     last = outermost - end_of(level_db[::-1], outermost - int(run[-1]))
-    first, last = likeliest_part(intensity, first, last, background)
+    beside = np.maximum(background, _local_background(focus, points, along, resolution))
+    first, last = likeliest_part(intensity / beside, first, last)
     if last - first < 2:
         return None
     return middle + places[first] * along, middle + places[last] * along
 
 
-def likeliest_part(
-    intensity: Float[np.ndarray, " places"], first: int, last: int, background: float
-) -> tuple[int, int]:
+def likeliest_part(over: Float[np.ndarray, " places"], first: int, last: int) -> tuple[int, int]:
     r"""Return the first and the last place of the part of a line that is likeliest wall.
 
     Places of a wall that is m times as bright as what is beside it, and of what is beside it, are
@@ -98,26 +97,38 @@ def likeliest_part(
     .. math:: \frac{I}{b}\Bigl(1 - \frac1m\Bigr) - \ln m ,
 
     over a part of the line is largest between the wall's ends (Page 1954, doi:10.2307/2333009). In
-    noise a line is followed from one bright place to the next, tens of cells beyond its wall.
+    noise, or in the lobes of something bright, a line is followed from one bright place to the
+    next, tens of cells beyond its wall.
 
     Parameters
     ----------
-    intensity
-        Along the line.
+    over
+        Intensity along the line over that beside it, I/b. [-]
     first, last
         The part to be searched.
-    background
-        Mean intensity b beside the line.
     """
-    if background <= 0:
-        return first, last
-    over = intensity[first : last + 1] / background
-    gains = over * (1 - 1 / WALL_LEVEL) - np.log(WALL_LEVEL)
+    gains = over[first : last + 1] * (1 - 1 / WALL_LEVEL) - np.log(WALL_LEVEL)
     sums = np.concatenate([[0.0], np.cumsum(gains)])
     rises = sums - np.minimum.accumulate(sums)
     stop = int(np.argmax(rises))
     begin = int(np.argmin(sums[: stop + 1]))
     return first + begin, first + stop - 1
+
+
+def _local_background(
+    focus: Focus,
+    points: Float[np.ndarray, "places 3"],
+    along: Float[np.ndarray, " 3"],
+    resolution: Resolution,
+) -> Float[np.ndarray, " places"]:
+    """Return the mean intensity beside each place of a line, by its median there. [-]."""
+    normal = np.array([along[1], -along[0], 0.0])
+    away = resolution.cell(points, normal)[:, None, None] * normal
+    offsets = BESIDE[BESIDE != 0.0]
+    intensity = np.abs(focus(points[:, None] + offsets[:, None] * away)) ** 2
+    window = round(CELLS_AT_END * SAMPLES_PER_CELL)
+    usual = uniform_filter1d(np.median(intensity, axis=1), window, mode="nearest")
+    return np.asarray(usual / np.log(2))
 
 
 def end_of(level_db: Float[np.ndarray, " places"], rough: int) -> int:

@@ -83,7 +83,7 @@ def test_of_a_line_in_noise_the_likeliest_part_is_the_wall(level: float) -> None
     for _ in range(200):
         intensity = rng.exponential(1.0, 140)
         intensity[50:90] *= level
-        first, last = likeliest_part(intensity, 10, 130, 1.0)
+        first, last = likeliest_part(intensity, 10, 130)
         errors.append([first - 50, last - 89])
     # A wall's last places may be dark: one in six at 10 dB is no brighter than 2.2 dB over the
     # noise, and a place of noise is so bright with exp(-1.65) = 19 %.
@@ -91,10 +91,9 @@ def test_of_a_line_in_noise_the_likeliest_part_is_the_wall(level: float) -> None
     assert np.mean(np.abs(errors) > 6) < 0.05
 
 
-def test_a_part_without_anything_beside_it_is_left_as_it_is() -> None:
-    assert likeliest_part(np.ones(20), 3, 15, 0.0) == (3, 15)
+def test_a_wall_whose_level_falls_ends_where_it_is_no_brighter_than_noise() -> None:
     # A wall whose level falls by 40 dB along it is wall to where it is 2.2 dB over the noise.
     falling = 10 ** np.linspace(4.0, 0.0, 81)
-    first, last = likeliest_part(falling, 0, 80, 1.0)
+    first, last = likeliest_part(falling, 0, 80)
     assert first == 0
     assert 10 * np.log10(falling[last]) == pytest.approx(2.2, abs=0.6)
