@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
@@ -24,6 +25,8 @@ class Ports:
     pattern: Pattern
     visible: Bool[np.ndarray, "ports facets"]
     nodes: int = 1  # frequencies that the pattern has to be sampled at
+    slabs: tuple[Any, ...] = ()  # crossings whose insertion the pattern holds
+    slab_nodes: int = 0  # how many of the nodes are these slabs'
     polarization: Polarization = VERTICAL  # in two dimensions the field is along z
     behind_slabs: "tuple[Ports, ...]" = ()
     """The same ports as the facets see them that waves only reach through slabs: for each set of

@@ -16,7 +16,8 @@ from scipy.constants import speed_of_light
 from scipy.fft import dct
 
 from simulator.materials.facet_reflection import STEEP
-from simulator.materials.fresnel_slab import Conductor, Material, reflection
+from simulator.materials.fresnel_slab import Conductor, Dielectric, Material, reflection
+from simulator.materials.slab_insertion import inserted
 from simulator.numerics.nufft_sum import barycentric_basis, chebyshev_nodes
 
 CHAIN_ACCURACY = 1e-4
@@ -114,6 +115,7 @@ def few_frequencies(
     frequencies: Float[np.ndarray, " freqs"],
     spread: float,
     materials: Sequence[Material],
+    slabs: Sequence[Dielectric],
     pattern_nodes: int,
     interpolate: bool,
 ) -> FewFrequencies | EveryFrequency:
@@ -127,6 +129,8 @@ def few_frequencies(
         Largest difference of path lengths at one facet. [m]
     materials
         Of the reflecting surfaces.
+    slabs
+        What the waves cross, patterns included.
     pattern_nodes
         Frequencies at which the patterns of the two antennas are sampled, in all.
     interpolate
@@ -138,14 +142,20 @@ def few_frequencies(
     interpolation needs no fewer.
     """
     start, stop = float(frequencies[0]), float(frequencies[-1])
-    count = nodes_for_chain(spread / speed_of_light, materials, start, stop) + pattern_nodes - 2
+    count = nodes_for_chain(spread / speed_of_light, materials, start, stop, slabs=slabs)
+    count += pattern_nodes - 2
     if interpolate and count < frequencies.size:
         return FewFrequencies(frequencies, chebyshev_nodes(start, stop, count))
     return EveryFrequency(frequencies)
 
 
 def nodes_for_chain(
-    delay_spread: float, materials: Sequence[Material], start: float, stop: float
+    delay_spread: float,
+    materials: Sequence[Material],
+    start: float,
+    stop: float,
+    *,
+    slabs: Sequence[Dielectric] = (),
 ) -> int:
     r"""Count the Chebyshev nodes that interpolate the response of a chain of surfaces over a band.
 
@@ -163,6 +173,8 @@ def nodes_for_chain(
         Of the surfaces.
     start, stop
         The band. [Hz]
+    slabs
+        What the waves cross.
 
     Returns
     -------
@@ -170,7 +182,7 @@ def nodes_for_chain(
     """
     half_phase = np.pi * delay_spread * (stop - start) / 2
     size = 64
-    while size < MOST_NODES and size < 2 * half_phase + 64 * (1 + len(materials)):
+    while size < MOST_NODES and size < 2 * half_phase + 64 * (1 + len(materials) + len(slabs)):
         size *= 2
     points = chebyshev_nodes(start, stop, size)[::-1]
     across = (2 * points - start - stop) / (stop - start)
@@ -178,6 +190,8 @@ def nodes_for_chain(
     for material in materials:
         if not isinstance(material, Conductor):
             product *= reflection(material, points, np.array(INCIDENCES)).te
+    for slab in slabs:
+        product *= inserted(slab, points, np.array(INCIDENCES)).te
     both = np.exp(1j * half_phase * np.array([1.0, -1.0])[:, None, None] * across) * product
     # dct() expects nodes in descending order, from cos(π/2K).
     coefficients = np.abs(dct(both.real, axis=-1) + 1j * dct(both.imag, axis=-1)) / size

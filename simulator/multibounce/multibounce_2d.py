@@ -31,7 +31,7 @@ from estimator.compute.engine import thread_count
 from estimator.measurement.model import Waves
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
-from simulator.materials.fresnel_slab import Material
+from simulator.materials.fresnel_slab import Dielectric, Material
 from simulator.materials.reflection_table import reflection_table
 from simulator.multibounce.chain_count import Sees, chains_to
 from simulator.multibounce.frequency_interpolation import (
@@ -281,14 +281,15 @@ def _few_frequencies(
     """Choose the frequencies that suffice for all chains divided at one target."""
     extra = max(link.nodes for link in links)
     spreads: dict[tuple[int, ...], float] = {}
-    materials: dict[tuple[int, ...], list[Material]] = {}
+    met: dict[tuple[int, ...], tuple[list[Material], list[Dielectric]]] = {}
     for link in links:
         made = [target.material, *(wall.material for wall in link.walls)]
-        key = tuple(sorted(id(one) for one in made))
+        crossed = [crossing.material for crossing in link.slabs]
+        key = (*sorted(map(id, made)), 0, *sorted(map(id, crossed)))
         spreads[key] = max(spreads.get(key, 0.0), link.spread)
-        materials[key] = made
+        met[key] = made, crossed
     choices = [
-        few_frequencies(frequencies, spread, materials[key], extra, interpolate)
+        few_frequencies(frequencies, spread, *met[key], extra, interpolate)
         for key, spread in spreads.items()
     ]
     return max(choices, key=lambda choice: choice.nodes.size)
@@ -311,8 +312,9 @@ def _pilot_over(
         return pilot
     materials = [face.material for face in chain]
     for passage in passages_over(user, chain[:-1], target, sees, frequencies):
-        extra = passage.nodes + array.nodes
-        total = few_frequencies(frequencies, passage.spread, materials, extra, interpolate)
+        extra = passage.nodes + array.nodes - array.slab_nodes
+        slabs = [crossing.material for crossing in (*passage.slabs, *array.slabs)]
+        total = few_frequencies(frequencies, passage.spread, materials, slabs, extra, interpolate)
         wave = passage.arriving(passage.at_last_wall(total.nodes), target, total.nodes)
         heard = direct(target, array, total.nodes)
         pilot += _linked(target, [(1.0, wave, heard)], len(array.positions), total, waves)

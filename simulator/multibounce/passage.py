@@ -15,7 +15,7 @@ from scipy.constants import speed_of_light
 
 from simulator.antennas.ports import Ports
 from simulator.geometry.faces import Face
-from simulator.materials.slab_insertion import passage_nodes
+from simulator.materials.slab_insertion import Crossing
 from simulator.multibounce.chain_count import Sees, outline
 from simulator.multibounce.iterative_physical_optics import (
     Bounds,
@@ -40,7 +40,6 @@ class Passage:
     walls: tuple[Face, ...]  # in order, with quadrature points
     sights: tuple[Sight, ...]  # between each wall and the next face
     bounds: tuple[Bounds, ...]  # at the face after each wall; the last at the target
-    through: int = 0  # frequencies needed for the slabs between walls
 
     @property
     def spread(self) -> float:
@@ -49,8 +48,14 @@ class Passage:
 
     @property
     def nodes(self) -> int:
-        """Frequencies needed for the ports' patterns and slabs, beyond those for the walls."""
-        return self.ports.nodes + self.through
+        """Frequencies needed for the ports' patterns, beyond those for walls and slabs."""
+        return self.ports.nodes - self.ports.slab_nodes
+
+    @property
+    def slabs(self) -> tuple[Crossing, ...]:
+        """Slabs that the wave crosses, those between the ports and the first wall first."""
+        between = (crossing for sight in self.sights for crossing in sight.crossings)
+        return (*self.ports.slabs, *between)
 
     def part(self, chosen: slice | Int[np.ndarray, " chosen"]) -> "Passage":
         """Select some of the target's facets."""
@@ -103,9 +108,14 @@ class Link:
 
     @property
     def nodes(self) -> int:
-        """Frequencies needed for the patterns of both ends and for slabs."""
-        ends = self.out.nodes, self.back.nodes
-        return sum(ends)
+        """Frequencies needed for the patterns of both ends."""
+        back = self.back.nodes - (0 if isinstance(self.back, Passage) else self.back.slab_nodes)
+        return self.out.nodes + back
+
+    @property
+    def slabs(self) -> tuple[Crossing, ...]:
+        """Slabs that the wave crosses on both ways."""
+        return (*self.out.slabs, *self.back.slabs)
 
 
 def passages_over(
@@ -119,7 +129,7 @@ def passages_over(
     first = chain[0].part(np.flatnonzero(ports.visible[:, chain[0].source].any(axis=0)))
     if first.count == 0:
         return
-    start, highest = float(frequencies[0]), float(frequencies[-1])
+    highest = float(frequencies[-1])
     yet: list[tuple[tuple[Face, ...], tuple[Sight, ...]]] = [((), ())]
     chain = [first, *chain[1:]]
     for place in reversed(range(len(chain))):  # each wall's points depend on the next face
@@ -137,10 +147,7 @@ def passages_over(
             latest = onward_bounds(latest, wall, onto, sight.seen)
             bounds.append(latest)
         if latest.longest.any():
-            through = [passage_nodes(sight.crossings, start, highest) - 1 for sight in sights]
-            yield Passage(
-                ports=ports, walls=walls, sights=sights, bounds=tuple(bounds), through=sum(through)
-            )
+            yield Passage(ports=ports, walls=walls, sights=sights, bounds=tuple(bounds))
 
 
 def _towards(

@@ -309,13 +309,14 @@ def _through(
     frequencies = scenario.radio.frequencies
     if passage_level(crossings, frequencies) < LEAST_LEVEL:
         return None
+    added = passage_nodes(crossings, float(frequencies[0]), float(frequencies[-1])) - 1
     return replace(
         ports,
         visible=ports.visible & behind,
         pattern=partial(_inserted, ports.pattern, crossings, scenario),
-        nodes=ports.nodes
-        + passage_nodes(crossings, float(frequencies[0]), float(frequencies[-1]))
-        - 1,
+        nodes=ports.nodes + added,
+        slabs=(*ports.slabs, *crossings),
+        slab_nodes=ports.slab_nodes + added,
     )
 
 
