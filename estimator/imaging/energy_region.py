@@ -164,17 +164,25 @@ def energy_box(
     limit = farthest_told(echo, ahead=ahead)
     unambiguous = unambiguous_path(echo.frequencies) / 2
     near, reach, box = _within_range(echo, nearest, farthest)
+
+    def shell(first: float, last: float) -> Box:
+        box = _around(middles(echo), np.array([last]))
+        return _magnified(echo, _seen(echo, first, box, ahead, flat, sine), flat=flat)
+
+    if nearest is not None or farthest is not None:
+        if max(nearest or 0.0, farthest or limit) > unambiguous:
+            last = farthest or max(limit, (nearest or 0.0) + unambiguous)
+            return shell(nearest or 0.0, last)
+        return _magnified(echo, _seen(echo, near, box, ahead, flat, sine), flat=flat)
     if limit <= unambiguous:
         return _magnified(echo, _seen(echo, near, box, ahead, flat, sine), flat=flat)
-    asked = nearest is not None or farthest is not None
-    if asked or reach - near > TOLD * unambiguous:  # the aperture alone tells ranges
-        box = _around(middles(echo), np.array([min(farthest or limit, limit)]))
-        return _magnified(echo, _seen(echo, nearest or 0.0, box, ahead, flat, sine), flat=flat)
+    if reach - near > TOLD * unambiguous:  # the aperture alone tells ranges
+        return shell(0.0, limit)
     best, strongest = box, 0.0
     for period in range(int(np.ceil((limit - near) / unambiguous))):
         turns = period * unambiguous
-        shell = box if not period else _around(middles(echo), np.array([reach + turns]))
-        found = _magnified(echo, _seen(echo, near + turns, shell, ahead, flat, sine), flat=flat)
+        first = box if not period else _around(middles(echo), np.array([reach + turns]))
+        found = _magnified(echo, _seen(echo, near + turns, first, ahead, flat, sine), flat=flat)
         peak = _peak(echo, found, flat)
         if peak > SHARPER * strongest:
             best, strongest = found, peak
@@ -232,6 +240,8 @@ def _within_range(
     floor = false_alarm.threshold(false_alarm.TARGET, cells=intensity.size)
     least = max(FAINTEST_RANGE * float(intensity.max()), floor * mean_background(intensity))
     allowed = (ranges >= (nearest or 0.0)) & (ranges <= (farthest or limit))
+    if max(nearest or 0.0, farthest or 0.0) > limit:  # repeated: any range may be from there
+        allowed = np.ones(ranges.shape, dtype=bool)
     holds = (intensity > least) & allowed
     if not holds.any():
         holds = np.broadcast_to(allowed, intensity.shape)

@@ -37,6 +37,9 @@ FEW = 128
 of few ones range migration interpolates the spectrum badly. Of more it is faster. [-]"""
 WIDEST_SINE = 0.95
 """Largest sine of an angle off the array's normal that is imaged beyond its edges. [-]"""
+ASIDE = 0.7
+"""Sine of an angle off the array's normal up to which the far end of depths that were asked for is
+looked at: at 45° it is √2 as far away. [-]"""
 UNREFINED = 1.05
 """Spacing over that asked for, up to which nothing is said about it. [-]"""
 
@@ -163,14 +166,24 @@ def in_frame(echo: Echo, frame: ArrayFrame) -> Echo:
 
 
 def region_of(echo: Echo, view: Viewpoint, options: ImageOptions) -> Box:
-    """Find the region that holds the echo's energy, within the ranges that were asked for."""
+    """Find the region that holds the echo's energy, within the depths and ranges asked for."""
+    nearest, farthest = options.nearest, options.farthest
+    if view.ahead:
+        low, high = _local_bounds(view, options)[1]
+        if nearest is None and low is not None and low > 0:
+            nearest = low
+        if farthest is None and high is not None and high > 0:
+            sine = min(_unaliased(echo), ASIDE)
+            farthest = high / float(np.sqrt(1 - sine**2))
+        if nearest is not None and farthest is not None and farthest <= nearest:
+            nearest = farthest = None  # refused with the bounds
     return energy_box(
         echo,
         ahead=view.ahead,
         flat=view.flat,
         sine=_unaliased(echo) if view.ahead else 1.0,
-        nearest=options.nearest,
-        farthest=options.farthest,
+        nearest=nearest,
+        farthest=farthest,
     )
 
 
@@ -186,28 +199,36 @@ def _unaliased(echo: Echo) -> float:
     return max(min(sines), 0.1)
 
 
-def _with_bounds(box: Box, view: Viewpoint, options: ImageOptions) -> Box:
-    """Replace the bounds that were asked for in the world's frame."""
+def _local_bounds(
+    view: Viewpoint, options: ImageOptions
+) -> list[tuple[float | None, float | None]]:
+    """Turn the bounds of the world's axes to those of the array's own."""
     if all(bound is None for bound in (*options.low, *options.high)):
-        return box
+        return [(None, None)] * 3
     axes = view.frame.axes
     if np.abs(np.abs(axes).max(axis=1) - 1).max() > 1e-6:
         raise MeasurementError(
             "region: the array is not parallel to the world's axes, and its image is on its own; "
             "give a minimum and a maximum range instead"
         )
+    bounds = []
+    for row in axes:
+        axis = int(np.argmax(np.abs(row)))
+        sign = float(np.sign(row[axis]))
+        ends = (options.low[axis], options.high[axis])
+        local = [
+            None if end is None else sign * (end - float(view.frame.origin[axis])) for end in ends
+        ]
+        bounds.append((local[0], local[1]) if sign > 0 else (local[1], local[0]))
+    return bounds
+
+
+def _with_bounds(box: Box, view: Viewpoint, options: ImageOptions) -> Box:
+    """Replace the bounds that were asked for in the world's frame."""
     low, high = box.low.copy(), box.high.copy()
-    for axis in range(3):
-        local = int(np.argmax(np.abs(axes[:, axis])))
-        sign = float(np.sign(axes[local, axis]))
-        for bound, upper in ((options.low[axis], False), (options.high[axis], True)):
-            if bound is None:
-                continue
-            place = sign * (bound - float(view.frame.origin[axis]))
-            if upper == (sign > 0):
-                high[local] = place
-            else:
-                low[local] = place
+    for axis, (first, last) in enumerate(_local_bounds(view, options)):
+        low[axis] = low[axis] if first is None else first
+        high[axis] = high[axis] if last is None else last
     if view.flat:
         low[2] = high[2] = 0.0
     if np.any(high < low):

@@ -86,8 +86,26 @@ class ImagedScene:
         )
 
 
+def affordable(echo: Echo, view: Viewpoint) -> bool:
+    """Tell whether an image of all that an echo shows resolves it within the most pixels.
+
+    Parameters
+    ----------
+    echo
+        In the array's frame.
+    view
+        Where the array looks, and its frame.
+    """
+    return not scene_grid(echo, view, ImageOptions())[1]
+
+
 def imaged_scene(
-    echo: Echo, *, view: Viewpoint, reason: str, options: ImageOptions | None = None
+    echo: Echo,
+    *,
+    view: Viewpoint,
+    reason: str,
+    options: ImageOptions | None = None,
+    walls: str = ", and no walls were looked for",
 ) -> ImagedScene:
     """Image what an echo shows, and find targets in it.
 
@@ -101,6 +119,8 @@ def imaged_scene(
         Why no walls are looked for.
     options
         What is asked for in the world's frame; ``None``: all is chosen by where the energy is.
+    walls
+        What the note says of them.
     """
     grid, notes = scene_grid(echo, view, options or ImageOptions())
     values, method = scene_values(echo, grid, window=SURVEY_TAPER)
@@ -112,5 +132,5 @@ def imaged_scene(
         grid=grid,
         values=values,
         found=found,
-        notes=(f"{reason}: imaged by {method}, and no walls were looked for", *notes, *nothing),
+        notes=(f"{reason}: imaged by {method}{walls}", *notes, *nothing),
     )

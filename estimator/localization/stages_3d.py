@@ -22,7 +22,7 @@ from estimator.imaging.point_levels import point_levels_db
 from estimator.localization.aliasing import aliasing_notes, order_notes
 from estimator.localization.close_range import close_scene, too_large
 from estimator.localization.constant_room import RoomBehindConstant
-from estimator.localization.imaged_scene import imaged_scene
+from estimator.localization.imaged_scene import ImagedScene, affordable, imaged_scene
 from estimator.localization.stages import Heard, MappedRoom
 from estimator.mapping.map_3d import (
     SpaceMap,
@@ -107,6 +107,40 @@ class PlanarRoom:
         return space_images(self.map, frame, planar_resolution(self.array, self.echo), paths)
 
 
+@dataclass(frozen=True, kw_only=True)
+class RoomWithoutWalls:
+    """A room in which no wall was found: users are placed in it, targets taken from its image."""
+
+    room: PlanarRoom
+    scene: ImagedScene
+
+    @property
+    def context(self) -> MapContext:
+        """What users are placed in."""
+        return self.room.context
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Where the survey ends, and how the image was formed."""
+        return (*self.room.notes, *self.scene.notes)
+
+    def refined(self, found: UserEstimate, uplink: Uplink) -> UserEstimate:
+        """Return the answer itself."""
+        return self.room.refined(found, uplink)
+
+    def mirrors(self, frame: ArrayFrame) -> tuple[Mirror, ...]:
+        """Return none."""
+        return ()
+
+    def targets(self, frame: ArrayFrame) -> tuple[Target, ...]:
+        """Return the targets in the world's frame."""
+        return self.scene.targets(frame)
+
+    def images(self, frame: ArrayFrame, paths: Sequence[Float[np.ndarray, "_ 3"]]) -> Images:
+        """Return the image of what was found; around paths, the survey's."""
+        return self.room.images(frame, paths) if paths else self.scene.images(frame, paths)
+
+
 @dataclass(frozen=True)
 class PlanarStages:
     """The stages of a planar array."""
@@ -137,7 +171,11 @@ class PlanarStages:
         unsuited = close or too_large(echo, array)
         if unsuited is not None:
             return imaged_scene(echo, view=self.view, reason=unsuited)
-        return PlanarRoom(echo=echo, array=array, map=build_space_map(echo, array))
+        room = PlanarRoom(echo=echo, array=array, map=build_space_map(echo, array))
+        if room.map.planes or not room.map.targets or not affordable(echo, self.view):
+            return room
+        scene = imaged_scene(echo, view=self.view, reason="no mirror was found", walls="")
+        return RoomWithoutWalls(room=room, scene=scene)
 
     def hear(self, uplink: Uplink, *, clock_known: bool) -> Heard[DirectionMap]:
         """Map a pilot over both cosines and length, and take its paths out of it."""

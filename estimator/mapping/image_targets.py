@@ -22,6 +22,7 @@ from estimator.imaging.energy_region import (
 )
 from estimator.imaging.peak_detection import peak_shift
 from estimator.imaging.range_compression import unambiguous_path
+from estimator.mapping.facing_depth import facing_surface
 from estimator.measurement.model import Echo
 from estimator.results.estimate import Target
 from estimator.results.pixel_grid import PixelGrid
@@ -139,9 +140,32 @@ def image_targets(
             continue
         if found and (_in_shadow(peak, level, found, levels, cells) or not _one_wave(echo, peak)):
             continue  # the strongest is nobody's sidelobe
-        found.append(_target(echo, focuser, peak, level, region, intensity, axes))
+        target = _target(echo, focuser, peak, level, region, intensity, axes)
+        found.append(target if found else _at_its_depth(target, echo, peak, region, axes))
         levels.append(level)
     return tuple(found)
+
+
+def _at_its_depth(
+    target: Target,
+    echo: Echo,
+    peak: Float[np.ndarray, " 3"],
+    region: Bool[np.ndarray, "x y z"],
+    axes: tuple[np.ndarray, ...],
+) -> Target:
+    """Put a flat thing that faces the array where it is: its image is brightest beyond it."""
+    seen = np.argwhere(region)
+    ends = [[axis[i] for axis, i in zip(axes, end, strict=True)]
+            for end in (seen.min(axis=0), seen.max(axis=0))]  # fmt: skip
+    surface = facing_surface(echo, peak, np.array(ends[0]), np.array(ends[1]))
+    if surface is None:
+        return target
+    place = np.array([target.position[0], surface.depth, target.position[2]])
+    along = None
+    if target.ends is not None:
+        along = target.ends.copy()
+        along[:, 1] = surface.depth
+    return replace(target, position=place, ghost=place, ends=along)
 
 
 def _aliased(echo: Echo) -> bool:

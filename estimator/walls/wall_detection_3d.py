@@ -77,6 +77,10 @@ MOST = 0.5
 FLASH_CELLS = 4.0
 """Distance beyond the array's extent, from the foot of its perpendicular, up to which a plane shows
 no more than the array's reflection: a small plate does so as well, and a constant. [cells]"""
+UNIFORM = 0.8
+"""Share of the energy around its distance that a mirror's flat wave explains, of which no more is
+seen than that wave: a mirror as wide as the array returns the same to all positions. Letters at 1 m
+with strokes of two cells explain at most half. [-]"""
 INNER = 0.7
 """Where between its centre and its corners a polygon is sampled as well: half of its area is
 inside. [-]"""
@@ -115,7 +119,7 @@ def detect_planes(
     reach = planar_reach(array, echo, passes=2)
     sharp = focus_within(prepare(profiles), reach[1])
     found: list[FittedPlane] = []
-    head_on: list[bool] = []
+    explained: list[float] = []  # by the flat wave of each; 0: none was seen
 
     def followed(wall: PlaneWall) -> FittedPlane | None:
         return extent_of_plane(
@@ -133,7 +137,7 @@ def detect_planes(
         if plane is not None and plane.confidence >= LEAST_CONFIDENCE:
             if not any(_same(plane.wall, other.wall, coarse) for other in found):
                 found.append(plane)
-                head_on.append(True)
+                explained.append(wave.explained)
     unassigned = looked.peaks[~_explained(looked.peaks, found, coarse)]
     # One after the other: a wall that is followed to its ends takes more peaks than it began with.
     depth = float(looked.ranges[-1] - looked.ranges[0])
@@ -151,23 +155,30 @@ def detect_planes(
             used |= _explained(unassigned, [plane], coarse)
             if not any(_same(plane.wall, other.wall, coarse) for other in found):
                 found.append(plane)
-                head_on.append(False)
+                explained.append(0.0)
         unassigned = unassigned[~used]
     order: list[int] = []
     for i in sorted(range(len(found)), key=lambda i: -found[i].level):
+        if _small(found[i].wall, array, fine) and explained[i] < UNIFORM:
+            continue  # a thing no larger than the array, which it does not mirror
         stronger = [found[j].wall for j in order]
         points = points_on(found[i].wall, fine)[1]
         if not lobe_of_a_wall(echo, array, points, np.abs(looked.at(points)) ** 2, stronger):
             order.append(i)
     fitted = tuple(_in_doubt(found[i], array, fine) for i in order)
-    return Planes(fitted=fitted, head_on=tuple(head_on[i] for i in order))
+    return Planes(fitted=fitted, head_on=tuple(explained[i] > 0 for i in order))
 
 
 def _in_doubt(plane: FittedPlane, array: PlanarArray, fine: Resolution) -> FittedPlane:
     """Bound the confidence of a plane of which no more is seen than the array's own reflection."""
-    if beyond_the_flash(plane.wall.corners, plane.wall, array, fine).any():
+    if not _small(plane.wall, array, fine):
         return plane
     return replace(plane, confidence=min(plane.confidence, CONFIDENCE))
+
+
+def _small(wall: PlaneWall, array: PlanarArray, fine: Resolution) -> bool:
+    """Tell whether no more of a plane is seen than the array's own reflection."""
+    return not bool(beyond_the_flash(wall.corners, wall, array, fine).any())
 
 
 def beyond_the_flash(

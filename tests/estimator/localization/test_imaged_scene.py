@@ -6,11 +6,12 @@ from jaxtyping import Float
 from scipy.constants import speed_of_light
 
 from estimator.array.viewpoint import viewpoint
+from estimator.imaging.scene_image import ImageOptions, image_scene
 from estimator.localization.pipeline import locate
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.results.estimate import Estimate
 from validation.analytic.point_scatterer import complex_noise, point_echo
-from validation.trials.measured_scans import drawn_scan
+from validation.trials.measured_scans import drawn_scan, facing_echo, letter_points
 
 BAND = np.linspace(20e9, 26e9, 31)  # 0.75 m unambiguous, cells of 25 mm
 AHEAD = np.array([0.0, 1.0, 0.0])
@@ -163,3 +164,38 @@ def test_what_is_within_the_first_range_cell_of_a_plane_is_no_mirror() -> None:
     found = locate(drawn.measurement, images=False)
     assert not found.mirrors
     assert any("first range cell" in note for note in found.notes)
+
+
+def test_depths_beyond_the_unambiguous_range_are_imaged_where_they_are_asked_for() -> None:
+    """31 frequencies repeat every 0.75 m, and the aperture of 0.11 m tells depths to less."""
+    place = np.array([0.05, 1.0, -0.03])
+    measured = Measurement(echo=echo_of(place, scan(21, 5.6e-3)), uplinks=())
+    for asked in (
+        ImageOptions(nearest=0.9, farthest=1.2),
+        ImageOptions(low=(None, 0.85, None), high=(None, 1.15, None)),
+    ):
+        made = image_scene(measured, options=asked).image
+        brightest = np.unravel_index(int(np.abs(made.values).argmax()), made.values.shape)
+        # half a range cell of 25 mm, and half a cell across of 60 mm
+        assert np.abs(made.grid.points[brightest] - place).max() < 0.03
+    only_near = image_scene(measured, options=ImageOptions(nearest=0.9)).image
+    assert only_near.grid.y[-1] > 1.0
+
+
+def letter_at_a_metre() -> Echo:
+    positions = scan(51, 5e-3)
+    band = np.linspace(22e9, 26e9, 40)  # 1.46 m unambiguous
+    points = letter_points(0.25, 5e-3) + np.array([0.0, 1.0, 0.0])
+    samples = facing_echo(points, np.ones(len(points), dtype=complex), positions, band)
+    level = float(np.sqrt(np.mean(np.abs(samples) ** 2)))
+    added = 0.1 * level * complex_noise(samples.shape, 1.0, np.random.default_rng(5))
+    return Echo(samples=samples + added, positions=positions, frequencies=band)
+
+
+def test_a_flat_letter_at_a_metre_is_no_mirror_and_has_no_ghosts() -> None:
+    """It is no wider than the array, and returns to some positions more than to others."""
+    estimate = located(letter_at_a_metre())
+    assert not estimate.mirrors
+    (target,) = estimate.targets
+    assert abs(target.position[1] - 1.0) < 0.02  # half a range cell of 37 mm
+    assert any("no mirror was found: imaged by" in note for note in estimate.notes)
