@@ -34,6 +34,10 @@ from estimator.results.estimate import UserEstimate
 NEGLIGIBLE = 1e-6
 """Probability of a place below which it is not named: a thousandth of the doubt in a certain one.
 [-]"""
+SCATTERER = 0.01
+"""Difference between the length of a path over a body and that over the source of its wavefront:
+a cylinder's is half its radius behind its surface, and the bodies that scatter as one point here
+have radii of a centimetre or less. [m]"""
 UNSEEN_SOMEWHERE = (
     "the path is weaker than a direct one, or comes from where little is shown: a wall that the "
     "image does not show may have reflected it"
@@ -56,14 +60,6 @@ def on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     specular = [index for index, path in enumerate(found.paths) if path.specular]
     scattered = [path for path in found.paths if not path.specular]
     energy = sum(found.paths[index].share for index in specular)
-    if sum(path.share for path in scattered) > energy:
-        strongest = max(scattered, key=lambda path: path.share)
-        return UserEstimate(
-            name=name,
-            status="not_found",
-            reason=_why_none(strongest, found.how),
-            paths=path_reports(found, (), {}),
-        )
     chances = {
         index: chain_probabilities(
             found.paths[index].wave.path_length,
@@ -76,7 +72,31 @@ def on_our_clock(name: str, found: PathSet, room: MapContext) -> UserEstimate:
     }
     chains = {index: _ordered(some) for index, some in chances.items()}
     consistent = consistent_ones(chains, found, room)
-    return _decided(name, consistent, found, room, chains, chances)
+    answer = _decided(name, consistent, found, room, chains, chances) if consistent else None
+    left = [
+        path
+        for path in scattered
+        if answer is None or not _scattered_on_the_way(path, answer.position, found.how)
+    ]
+    if answer is None or sum(path.share for path in left) > energy:
+        strongest = max(left, key=lambda path: path.share)
+        return UserEstimate(
+            name=name,
+            status="not_found",
+            reason=_why_none(strongest, found.how),
+            paths=path_reports(found, (), {}),
+        )
+    return answer
+
+
+def _scattered_on_the_way(path: Path, user: Float[np.ndarray, " 3"] | None, how: Bearing) -> bool:
+    """Tell whether a path's length is that from a user over the source of its wavefront."""
+    if user is None:
+        return False
+    source = path.radius * how.towards(path.wave.bearing)
+    detour = float(np.linalg.norm(user - source)) + path.radius
+    error = 3 * path.free.curvature_deviation * path.radius**2
+    return abs(path.wave.path_length - detour) < SCATTERER + error
 
 
 def _decided(

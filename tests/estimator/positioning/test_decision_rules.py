@@ -617,6 +617,22 @@ def test_scattered_energy_beside_a_stronger_specular_wave_does_not_matter(dim: D
     at(found, user)
 
 
+@pytest.mark.parametrize(("aside", "status"), [(0.004, "found"), (0.04, "not_found")])
+def test_stronger_scattered_energy_is_explained_by_a_post_on_its_way(
+    dim: Dimension, aside: float, status: str
+) -> None:
+    # A beam that looks at the post: its wave is as long as the way from the user over it.
+    user, post = dim.user(0.3, 0.9), dim.user(-0.1, 0.6)
+    far = float(np.linalg.norm(post))
+    over = direct(
+        dim, post, length=far + float(np.linalg.norm(user - post)) + aside, radius=far, share=0.7
+    )
+    found = decided(dim, [over, direct(dim, user, share=0.3)], room())
+    assert found.status == status
+    if status == "found":
+        at(found, user)
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_strongest_wave_decides_in_whatever_order_they_were_found(
     dim: Dimension, order: int
