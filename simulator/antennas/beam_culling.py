@@ -82,11 +82,18 @@ def in_reach(
         Product of the patterns, over that of their peaks, that is left out. [-]
     """
     reached = np.zeros(len(centres), dtype=bool)
+    # An antenna is in many pairs: its bounds are evaluated once, where no pair before reached.
+    known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def bounds(group: AntennaGroup, left: np.ndarray) -> np.ndarray:
+        if id(group) not in known:
+            known[id(group)] = left, group.at_most(centres[left], radius)
+        where, values = known[id(group)]
+        return np.asarray(values[np.searchsorted(where, left)])
+
     for one, other in pairs:
         left = np.flatnonzero(~reached)
         if left.size == 0:
             break
-        bound = one.at_most(centres[left], radius)
-        bound = bound * (bound if one is other else other.at_most(centres[left], radius))
-        reached[left] = bound >= level
+        reached[left] = bounds(one, left) * bounds(other, left) >= level
     return reached
