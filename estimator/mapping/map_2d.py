@@ -20,8 +20,9 @@ from estimator.measurement.model import Echo
 from estimator.results.estimate import Mirror, Target
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
+from estimator.walls.line_relations import unassigned_peaks
 from estimator.walls.sources_aside import without_sources_aside
-from estimator.walls.wall_detection_2d import detect_mirrors, unassigned_peaks
+from estimator.walls.wall_detection_2d import detect_mirrors
 
 MOST_POINTS = 32
 """Strongest peaks on no wall that are tried as what scatters on to a wall, for time: those that are

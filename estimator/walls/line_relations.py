@@ -5,8 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from estimator.array.resolution_cell import Resolution
+from estimator.array.linear_array import echo_resolution
+from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing, mirrored
+from estimator.imaging.survey_2d import Survey
+from estimator.measurement.model import Echo
 from estimator.walls.fitted_line import FittedLine
 
 EDGE_DEVIATIONS = 3.0
@@ -139,3 +142,18 @@ def is_edge_on(line: FittedLine, half: float) -> bool:
     deviations = np.sqrt(np.diag(line.covariance)) * [line.middle @ line.direction, 1.0]
     reach = half * abs(float(normal[0])) + EDGE_DEVIATIONS * float(np.linalg.norm(deviations))
     return abs(float(line.middle @ normal)) < reach
+
+
+def unassigned_peaks(
+    echo: Echo, looked: Survey, lines: Sequence[FittedLine]
+) -> Float[np.ndarray, "peaks 3"]:
+    """Return the survey's peaks that lie neither on a wall nor behind one, strongest first."""
+    resolution = coarse_resolution(echo_resolution(echo))
+    return np.array(
+        [
+            peak
+            for peak in looked.peaks[~looked.bent]
+            if not any(lies_on(peak, line, resolution, margin=BEYOND_END) for line in lines)
+            and not any(hides(line, peak) for line in lines)
+        ]
+    ).reshape(-1, 3)

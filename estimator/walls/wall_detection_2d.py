@@ -233,7 +233,10 @@ def _faint(
     half = 0.5 * float(np.ptp(echo.positions[:, 0]))
     found: list[FittedLine] = []
     taken = [LineCandidate(start=one.start, end=one.end, inliers=0) for one in known]
+    lobes = looked.peaks[np.maximum(looked.as_point, looked.as_mirror) < LEAST_COHERENCE]
     for candidate in find_faint_lines(looked, taken, coarse):
+        if any(_is_at(tip, lobes, coarse) for tip in (candidate.start, candidate.end)):
+            continue  # a lobe of something else is no end of a wall
         line = _evenly_fitted(candidate, plain, tapered, resolution, trials)
         if line is None or line.confidence < LEAST_CONFIDENCE:
             continue
@@ -257,6 +260,15 @@ def _faint(
             continue  # along an arc of sidelobes; a wall that nearly faces the array is not faint
         found.append(replace(line, explained=0.0))
     return found
+
+
+def _is_at(
+    place: Float[np.ndarray, " 3"], peaks: Float[np.ndarray, "peaks 3"], coarse: Resolution
+) -> bool:
+    """Tell whether a place is within a cell of one of some peaks."""
+    away = np.linalg.norm(peaks - place, axis=-1)
+    across = np.array([place[1], -place[0], 0.0]) / np.linalg.norm(place)
+    return bool(np.any(away < float(coarse.cell(place, across))))
 
 
 def _evenly_fitted(
@@ -381,18 +393,3 @@ def _to_its_ends(
         return line
     shorter = fit_between(plain, tapered, *ends, resolution, trials=1)
     return line if shorter is None else replace(shorter, confidence=line.confidence)
-
-
-def unassigned_peaks(
-    echo: Echo, looked: Survey, lines: Sequence[FittedLine]
-) -> Float[np.ndarray, "peaks 3"]:
-    """Return the survey's peaks that lie neither on a wall nor behind one, strongest first."""
-    resolution = coarse_resolution(echo_resolution(echo))
-    return np.array(
-        [
-            peak
-            for peak in looked.peaks[~looked.bent]
-            if not any(lies_on(peak, line, resolution, margin=BEYOND_END) for line in lines)
-            and not any(hides(line, peak) for line in lines)
-        ]
-    ).reshape(-1, 3)

@@ -3,7 +3,7 @@
 Run as ``python -m validation.experiments.thresholds [TABLE ...] [DRAWS] [--only CONSTANT ...]``;
 with ``--only BLOCKED --only USUAL`` the tables of scans hold these constants alone.
 
-Not in the thesis, whose walls are marked by hand. Nine tables:
+Not in the thesis, whose walls are marked by hand. Ten tables:
 
 - ``chance``: false-alarm rates and false detections by noise and random peaks
   (:mod:`validation.trials.chance_finds`);
@@ -19,7 +19,8 @@ Not in the thesis, whose walls are marked by hand. Nine tables:
   soil, with a linear and a planar array (:mod:`validation.trials.measured_scans`);
 - ``space``: as ``answers`` in rooms in space (the set ``space`` of random rooms, those for tuning);
 - ``lists``: the same for priors of path lists (:mod:`validation.trials.list_answers`);
-- ``limits``: what is lost by limits of searches (:mod:`validation.trials.numerical_limits`).
+- ``limits``: what is lost by limits of searches (:mod:`validation.trials.numerical_limits`);
+- ``rooms``: walls of random rooms, one for each draw (:mod:`validation.trials.lines_in_rooms`).
 
 Claims that are asserted: each threshold does what its docstring states, within the limits in the
 table; and no scan's own value gives fewer right answers, or more false ones, than a neighbour.
@@ -54,6 +55,7 @@ from validation.trials.constant_scans import (
     Scan,
 )
 from validation.trials.drawn_echoes import Kind
+from validation.trials.lines_in_rooms import room_line_rows
 from validation.trials.list_answers import (
     drawn_lists,
     list_answers,
@@ -88,7 +90,7 @@ from validation.trials.wall_statistics import (
     wall_statistics,
 )
 
-TABLES = ("chance", "walls", "scans", "answers", "decisions", "images", "space", "lists", "limits")
+TABLES = tuple("chance walls scans answers decisions images space lists limits rooms".split())
 DRAWS = 12
 """Walls of each family. [-]"""
 ROOM_SEEDS = 1
@@ -144,8 +146,7 @@ SCANS = (
     Scan(module="estimator.walls.wall_detection_2d", name="NEAREST", values=(0.25, 1.0)),
 )
 EVERY_SCAN: tuple[Sequence[Scan], ...] = (
-    SCANS, ANSWER_SCANS, (RIVAL_SCAN,), DECISION_SCANS, IMAGE_SCANS, SPACE_SCANS,
-    LIST_SCANS,
+    SCANS, ANSWER_SCANS, (RIVAL_SCAN,), DECISION_SCANS, IMAGE_SCANS, SPACE_SCANS, LIST_SCANS,
 )  # fmt: skip
 """All scans, by table."""
 
@@ -377,6 +378,8 @@ def main(arguments: list[str]) -> None:
         aside = random_room(*BRIGHT_ASIDE).measurement.echo
         assert aside is not None
         rows += limit_rows(echoes, aside, [rough_pilot(*wall, 0) for wall in DIFFUSE])
+    if "rooms" in wanted:
+        rows += room_line_rows([random_room("plain", number) for number in range(draws)])
     conclude(rows)
 
 

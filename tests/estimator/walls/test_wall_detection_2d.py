@@ -13,11 +13,11 @@ from estimator.imaging.survey_2d import survey
 from estimator.measurement.model import Echo, MeasurementError
 from estimator.walls.fitted_line import FittedLine
 from estimator.walls.line_refinement import refine_by_echo
+from estimator.walls.line_relations import unassigned_peaks
 from estimator.walls.wall_detection_2d import (
     LEAST_CELLS,
     LEAST_CONFIDENCE,
     detect_mirrors,
-    unassigned_peaks,
 )
 
 WALLS = 8
