@@ -17,6 +17,9 @@ COLUMNS = ("x1_m", "y1_m", "x2_m", "y2_m")
 PLACES = 41
 """Points of a predicted segment that are compared with the walls. [-]"""
 
+SEGMENTS = 100
+"""Most segments that are read of a sample, on average: its rooms have a few walls. [-]"""
+
 Counts = Float[np.ndarray, "samples 4"]
 """Of each sample: walls, walls found, segments, segments that are right."""
 
@@ -29,7 +32,14 @@ def read(path: Path, samples: int) -> list[Float[np.ndarray, "segments 2 2"]]:
     MeasurementError
         If the file is wrong, or a segment has no length.
     """
-    table = read_predictions(path, keys=("sample",), values=COLUMNS, samples=samples, once=False)
+    table = read_predictions(
+        path,
+        keys=("sample",),
+        values=COLUMNS,
+        samples=samples,
+        rows=SEGMENTS * samples,
+        once=False,
+    )
     refuse_wild(path, table, COLUMNS)
     ends = table[list(COLUMNS)].to_numpy(dtype=np.float64).reshape(-1, 2, 2)
     numbers = table["sample"].to_numpy()

@@ -24,7 +24,12 @@ def read(path: Path, samples: int) -> Float[np.ndarray, "samples 2"]:
         If the file is wrong.
     """
     table = read_predictions(
-        path, keys=("sample",), values=COLUMNS, optional=("found",), samples=samples
+        path,
+        keys=("sample",),
+        values=COLUMNS,
+        optional=("found",),
+        samples=samples,
+        rows=samples,
     )
     refuse_missing(path, table, samples)
     absent = np.zeros(samples, dtype=bool)

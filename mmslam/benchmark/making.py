@@ -117,9 +117,19 @@ def make_part(
 
 
 def store_digest(store: Path) -> str:
-    """Return a digest of the names and contents of all files of a store."""
+    """Return a digest of the names and contents of all files of a store.
+
+    Raises
+    ------
+    OutputError
+        If a file or folder in it is a link: what it leads to is no part of the store.
+    """
     digest = hashlib.sha256()
-    for path in sorted(one for one in store.rglob("*") if one.is_file()):
+    found = sorted(store.rglob("*"))
+    for path in found:
+        if path.is_symlink():
+            raise OutputError(f"{path} is a link; put what it leads to into the store itself")
+    for path in (one for one in found if one.is_file()):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(store).as_posix()}\0{len(content)}\0".encode())
         digest.update(content)

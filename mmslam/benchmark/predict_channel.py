@@ -32,9 +32,10 @@ def read(path: Path, samples: int, recipe: Recipe, shape: tuple[int, int]) -> np
         If the file is wrong.
     """
     keys = ("sample", "element", "frequency")
-    table = read_predictions(path, keys=keys, values=COLUMNS, samples=samples)
-    refuse_missing(path, table, samples)
     rows, columns = grid(recipe, *shape)
+    wanted = samples * len(rows) * len(columns)
+    table = read_predictions(path, keys=keys, values=COLUMNS, samples=samples, rows=wanted)
+    refuse_missing(path, table, samples)
     for name, known in (("element", rows), ("frequency", columns)):
         stray = table[~table[name].isin(known)]
         if len(stray):
@@ -42,7 +43,6 @@ def read(path: Path, samples: int, recipe: Recipe, shape: tuple[int, int]) -> np
                 f"{path}: {name} {int(stray[name].iloc[0])} is not asked for; the indices are "
                 f"{', '.join(map(str, known))}"
             )
-    wanted = samples * len(rows) * len(columns)
     if len(table) != wanted:
         raise MeasurementError(
             f"{path}: {len(table)} rows, but {samples} samples of {len(rows)} elements and "

@@ -68,11 +68,37 @@ def hdf5_array(
     except MeasurementError:
         raise
     except Exception as error:  # HDF5 fails in many ways on a damaged file
-        raise MeasurementError(
-            f"{path}: cannot be read as HDF5 ({type(error).__name__}: {error}); it may be "
-            "truncated: copy it again"
-        ) from error
+        raise MeasurementError(_damaged(path, error)) from error
     return values if matlab_classes is None else values.T
+
+
+def hdf5_attribute(path: Path, key: str) -> float | None:
+    """Read one number among the attributes of the whole file; None if there is no such number.
+
+    Raises
+    ------
+    MeasurementError
+        If the file is damaged, or no HDF5.
+    """
+    import h5py  # takes a third of a second
+
+    try:
+        with h5py.File(path, "r") as file:
+            if key not in file.attrs:
+                return None
+            kept = file.attrs.get_id(key)
+            if kept.shape not in ((), (1,)) or kept.dtype.kind not in "iuf":
+                return None
+            return float(np.asarray(file.attrs[key]).ravel()[0])
+    except Exception as error:  # HDF5 fails in many ways on a damaged file
+        raise MeasurementError(_damaged(path, error)) from error
+
+
+def _damaged(path: Path, error: Exception) -> str:
+    return (
+        f"{path}: cannot be read as HDF5 ({type(error).__name__}: {error}); it may be "
+        "truncated: copy it again"
+    )
 
 
 def _dataset(h5py: Any, path: Path, file: Any, name: str) -> Any:

@@ -14,6 +14,7 @@ from jaxtyping import Complex, Float, Num
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.array_files import ArrayFiles, format_of
+from mmslam.formats.hdf5_files import hdf5_attribute
 from mmslam.formats.mapped_arrays import line_of
 from mmslam.formats.tables.sources import TIME_UNITS
 from mmslam.formats.tables.time_tables import TimeTable
@@ -66,7 +67,7 @@ def trace_times(files: ArrayFiles, path: Path, table: TimeTable) -> TraceTimes:
         first = header.first_time + (table.first - table.zero) / unit
         return TraceTimes(first=first, step=header.time_step, points=header.traces.shape[-1])
     if kind == "hdf5":
-        step = _attribute(path, "dt")
+        step = _time_step(path)
         return TraceTimes(first=(table.first - table.zero) / unit, step=step, points=None)
     raise MeasurementError(
         f"{path}: nothing tells the times; give time.variable, or time.step in {table.unit}"
@@ -141,7 +142,7 @@ def _band_note(
     frequencies: Float[np.ndarray, " freqs"],
 ) -> tuple[str, ...]:
     power = (np.abs(samples) ** 2).mean(axis=0)
-    strong = np.flatnonzero(power > 10 ** (WEAK_BAND_DB / 10) * power.max())
+    strong = np.flatnonzero(power >= 10 ** (WEAK_BAND_DB / 10) * power.max())
     if strong.size == power.size:
         return ()
     low, high = frequencies[strong[0]] / 1e9, frequencies[strong[-1]] / 1e9
@@ -151,18 +152,11 @@ def _band_note(
     )
 
 
-def _attribute(path: Path, key: str) -> float:
-    import h5py  # type: ignore[import-untyped]  # takes a third of a second
-
-    try:
-        with h5py.File(path, "r") as file:
-            found = file.attrs.get(key)
-    except OSError as error:
-        raise MeasurementError(f"{path}: cannot be read as HDF5 ({error})") from None
-    value = float(found) if isinstance(found, int | float | np.number) else np.nan
-    if not value > 0:
+def _time_step(path: Path) -> float:
+    found = hdf5_attribute(path, "dt")
+    if found is None or not 0 < found < np.inf:
         raise MeasurementError(
-            f"{path}: has no attribute {key!r} of the time step (gprMax writes it); give "
+            f"{path}: has no attribute 'dt' of the time step (gprMax writes it); give "
             "time.variable or time.step"
         )
-    return value
+    return found

@@ -121,6 +121,21 @@ def test_a_part_is_made_again_byte_for_byte(parts: Path, tmp_path: Path) -> None
         make_part("user", "test", tmp_path, size=SIZE)
 
 
+def test_a_digest_follows_no_link(tmp_path: Path) -> None:
+    store, outside = tmp_path / "a.zarr", tmp_path / "outside"
+    (store / "echo").mkdir(parents=True)
+    (store / "echo" / "0").write_bytes(b"samples")
+    whole = store_digest(store)
+    outside.mkdir()
+    (outside / "secret").write_bytes(b"secret")
+    for target in (outside / "secret", outside, store / "echo" / "0", outside / "nowhere"):
+        (store / "link").symlink_to(target)
+        with pytest.raises(OutputError, match=r"a\.zarr/link is a link"):
+            store_digest(store)
+        (store / "link").unlink()
+    assert store_digest(store) == whole
+
+
 @pytest.mark.parametrize("track", ["user", "channel"])
 def test_the_test_part_holds_inputs_and_no_answer(parts: Path, track: str) -> None:
     root = zarr.open_group(parts / f"{track}-test.zarr", mode="r")

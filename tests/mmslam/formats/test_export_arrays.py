@@ -1,3 +1,4 @@
+import shutil
 from pathlib import Path
 
 import netCDF4
@@ -100,6 +101,25 @@ def test_wrong_exports_are_refused(
     assert "it.mat exists; move it away" in refused(store, "--matlab", new)
     assert new.read_text() == "mine"
     assert [path.name for path in tmp_path.iterdir()] == ["it.mat"]
+
+
+@pytest.mark.parametrize("what", ["--matlab", "--netcdf", "--touchstone", "--huggingface"])
+@pytest.mark.parametrize("whole", [False, True])
+def test_no_export_follows_a_link_out_of_the_store(
+    store: Path, tmp_path: Path, what: str, whole: bool
+) -> None:
+    inside = tmp_path / "a.zarr"
+    shutil.copytree(store, inside)
+    linked = inside / "echo" / "c"
+    if not whole:  # a single file of the samples
+        linked = next(path for path in sorted(linked.rglob("*")) if path.is_file())
+    outside = linked.rename(tmp_path / "outside")
+    linked.symlink_to(outside)
+    one = ("--sample", 0) if what == "--touchstone" else ()
+    result = mmslam("export", inside, what, tmp_path / "new", *one)
+    assert result.exit_code == 2, result.output
+    assert "is a link out of the store" in " ".join(result.stderr.split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "outside"]
 
 
 def test_a_script_beside_says_what_each_variable_of_the_matlab_file_is(

@@ -10,6 +10,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Echo, MeasurementError
+from mmslam.formats.hdf5_files import hdf5_attribute
 from mmslam.formats.import_measured import Import
 
 TARGET = np.array([0.02, 0.35, 0.0])  # [m]
@@ -109,6 +110,51 @@ def test_gprmax_and_gssi_files_tell_their_own_time_step(
     )
     # A count is 1/30000 of the pulse's height, and its spectrum is summed over 512 samples.
     np.testing.assert_allclose(turned_back(echo), flat, atol=3e-3)
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "two", "NaN", "none"])
+def test_a_damaged_gprmax_file_is_told(
+    tmp_path: Path, damage: str, take: Callable[[Path, str, str], Import]
+) -> None:
+    path = tmp_path / "scan.out"
+    values = {"text": "2e-11", "two": [2e-11, 2e-11], "NaN": np.nan}
+    with h5py.File(path, "w") as file:
+        if damage != "none":
+            file.attrs["dt"] = values.get(damage, 2e-11)
+        file["rxs/rx1/Ez"] = np.ones((64, 9))
+    if damage == "cut":
+        path.write_bytes(path.read_bytes()[:-1000])
+    with pytest.raises(MeasurementError, match=r"cannot be read as HDF5|has no attribute 'dt'"):
+        take(
+            tmp_path, "scan.out",
+            f'time = {{ unit = "ns", band_ghz = [5.2, 6.8] }}\n{LINE}'
+            'echo = { variable = "rxs/rx1/Ez", axes = ["time", "position"] }',
+        )  # fmt: skip
+
+
+def test_every_flipped_byte_of_a_gprmax_file_is_told_or_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "scan.out"
+    with h5py.File(path, "w") as file:
+        file.attrs["dt"] = 2e-11
+        file["Ez"] = np.ones(3)
+    whole = path.read_bytes()
+    kinds = set()
+    for at in range(len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        try:
+            hdf5_attribute(path, "dt")
+        except MeasurementError as error:
+            kinds.add(type(error.__cause__))
+    assert kinds > {OSError}  # HDF5 has others too: what catches this one alone ends in a traceback
+
+
+def test_traces_without_power_in_the_band_are_told(
+    tmp_path: Path, take: Callable[[Path, str, str], Import]
+) -> None:
+    np.save(tmp_path / "t.npy", np.zeros((9, 250)))
+    mapping = 'time = { step = 20.0, unit = "ps", band_ghz = [5.2, 6.8] }\n' + LINE + "echo = {}"
+    with pytest.raises(MeasurementError, match="all samples are zero; nothing was received"):
+        take(tmp_path, "t.npy", mapping)
 
 
 def write_dzt(path: Path, scans: np.ndarray, step: float) -> None:
