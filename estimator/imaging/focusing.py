@@ -38,23 +38,6 @@ def focus_within(focuser: Focuser, farthest: float) -> Focus:
     return focused
 
 
-def compressed(focus: Focus, usual: float) -> Focus:
-    r"""Return a focus whose intensity grows as its logarithm where it is above the usual one.
-
-    .. math:: I \to u \ln(1 + I / u)
-
-    so that bright places still have their maxima where they are, but do not outweigh the rest.
-    """
-    scale = max(usual, float(np.finfo(float).tiny))
-
-    def limited(points: Float[np.ndarray, "*grid 3"]) -> Complex[np.ndarray, "*grid"]:
-        values = focus(points)
-        over = np.maximum(np.abs(values) ** 2 / scale, np.finfo(float).tiny)
-        return np.asarray(values * np.sqrt(np.log1p(over) / over))
-
-    return limited
-
-
 @dataclass(frozen=True, eq=False)
 class PreparedEcho:
     """Range profiles of an echo, without a taper and with the survey's; each is made when asked."""

@@ -10,7 +10,7 @@ from estimator import false_alarm
 from estimator.array.linear_array import echo_reach, echo_resolution
 from estimator.array.resolution_cell import Resolution, coarse_resolution
 from estimator.geometry.wall_2d import crossing
-from estimator.imaging.focusing import Focus, PreparedEcho, compressed, focus_within
+from estimator.imaging.focusing import Focus, PreparedEcho, focus_within
 from estimator.imaging.range_compression import RangeProfiles
 from estimator.imaging.survey_2d import Survey
 from estimator.measurement.model import Echo
@@ -237,14 +237,16 @@ def _faint(
     for candidate in find_faint_lines(looked, taken, coarse):
         if any(_is_at(tip, lobes, coarse) for tip in (candidate.start, candidate.end)):
             continue  # a lobe of something else is no end of a wall
-        line = _evenly_fitted(candidate, plain, tapered, resolution, trials)
+        line = fit_between(
+            plain, tapered, candidate.start, candidate.end, resolution, trials=trials
+        )
         if line is None or line.confidence < LEAST_CONFIDENCE:
             continue
         if line.background > MOST_NOISE * looked.background:
             continue
         usual = median_level(tapered, line.start, line.end, resolution)
-        if usual > RIDGE_LEVEL * line.background:
-            continue  # bright ones had their chance
+        if usual > RIDGE_LEVEL * line.background or line.level > MOST_UNEVEN * usual:
+            continue  # bright ones had their chance; a bright place alone draws a line to itself
         if not _is_of_waves(line, looked, coarse):
             continue
         if is_uncertain(line, resolution) or is_edge_on(line, half):
@@ -269,19 +271,6 @@ def _is_at(
     away = np.linalg.norm(peaks - place, axis=-1)
     across = np.array([place[1], -place[0], 0.0]) / np.linalg.norm(place)
     return bool(np.any(away < float(coarse.cell(place, across))))
-
-
-def _evenly_fitted(
-    candidate: LineCandidate, plain: Focus, tapered: Focus, resolution: Resolution, trials: int
-) -> FittedLine | None:
-    """Fit a faint line between its ends; a post before its wall would draw it to itself."""
-    ends = candidate.start, candidate.end
-    line = fit_between(plain, tapered, *ends, resolution, trials=trials)
-    usual = [median_level(one, *ends, resolution) for one in (plain, tapered)]
-    if line is not None and line.level <= MOST_UNEVEN * usual[1]:
-        return line
-    even, low = (compressed(one, usual[k]) for k, one in enumerate((plain, tapered)))
-    return fit_between(even, low, *ends, resolution, trials=trials)
 
 
 def _fitted_line(
