@@ -9,7 +9,7 @@ from .full_wave import simulate_full_wave
 from .library import Scenario, load_scenario, scenarios
 from .location import locate
 from .measured_data import import_measured
-from .measurement import Echo, Measurement, PathList, Uplink
+from .measurement import Air, Echo, Measurement, PathList, Uplink
 from .measurement_files import read, write
 from .pipeline import simulate
 from .results.estimate import Estimate
@@ -17,6 +17,7 @@ from .results.plots import plot_angle_range_map, plot_estimate, plot_image, plot
 from .sionna_channel import SionnaChannel, to_sionna_cir
 
 __all__ = [
+    "Air",
     "Echo",
     "Estimate",
     "Measurement",

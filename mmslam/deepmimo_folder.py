@@ -84,13 +84,14 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
         )
     if folder.name != folder.name.lower():
         raise OutputError(f"{folder}: DeepMIMO looks for names in small letters; rename it")
+    from simulator.materials.gas_absorption import refractive_index
     from simulator.scene.user_paths import user_paths  # Sionna's import takes seconds
 
     paths = user_paths(scenario)
     quiet = scenario.model_copy(update={"noise": Noise()})
     pilots = {one.user: one.samples for one in simulate(quiet, seed=seed).uplinks}
     elements = scenario.base_station.element_positions
-    matrices = _matrices(list(paths.values()))
+    matrices = _matrices(list(paths.values()), refractive_index(scenario.air))
     matrices["rx_pos"] = np.array([user.position for user in scenario.users.values()])
     matrices["tx_pos"] = elements.mean(axis=0)[None]
     heard = [any(abs(one.gain) > 0 for one in some) for some in paths.values()]
@@ -114,7 +115,7 @@ def to_deepmimo(scenario: Scenario, folder: str | Path, *, seed: int = 0) -> Pat
     return folder
 
 
-def _matrices(users: Sequence[Sequence["UserPath"]]) -> dict[str, np.ndarray]:
+def _matrices(users: Sequence[Sequence["UserPath"]], index: float) -> dict[str, np.ndarray]:
     """Return powers [dB], phases and angles [degree], delays [s] and interactions of all paths."""
     shape = (len(users), MOST_PATHS)
     names = ("power", "phase", "delay", "aoa_az", "aoa_el", "aod_az", "aod_el", "inter")
@@ -127,7 +128,7 @@ def _matrices(users: Sequence[Sequence["UserPath"]]) -> dict[str, np.ndarray]:
             place = row, column
             found["power"][place] = 20 * np.log10(abs(path.gain))
             found["phase"][place] = np.degrees(np.angle(path.gain))
-            found["delay"][place] = path.length / speed_of_light
+            found["delay"][place] = path.length * index / speed_of_light
             found["aod_az"][place], found["aod_el"][place] = _angles(places[1] - places[0])
             found["aoa_az"][place], found["aoa_el"][place] = _angles(places[-2] - places[-1])
             codes = ["4" * count for count in path.slabs[::-1]]  # of what each leg goes through

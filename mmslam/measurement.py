@@ -16,12 +16,13 @@ from jaxtyping import Complex, Float
 from numpy.typing import ArrayLike
 
 from estimator.measurement import model
+from estimator.measurement.air import Air
 from estimator.measurement.model import Echo, MeasurementError, PathList, Uplink, Waves
 from estimator.measurement.store import measurement_to_dataset
 from mmslam.table import Table, html, text
 from validation.metrics.truth import Truth, read_truth_dataset, truth_from_dataset
 
-__all__ = ["Echo", "Measurement", "PathList", "TruthFile", "Uplink"]
+__all__ = ["Air", "Echo", "Measurement", "PathList", "TruthFile", "Uplink"]
 
 USER = "user"
 """Default name of the user of a single pilot."""
@@ -93,6 +94,8 @@ class Measurement(model.Measurement):
         boresight: Sequence[float] = (0.0, 1.0, 0.0),
         clock_offset: float | None = None,
         scenario: str | None = None,
+        air: Air | None = None,
+        medium_index: float | None = None,
     ) -> "Measurement":
         """Make a measurement of plain arrays: your own sweep.
 
@@ -113,6 +116,10 @@ class Measurement(model.Measurement):
         waves, boresight, clock_offset, scenario
             As in the measurement file: ``clock_offset`` [s] is the user's clock minus ours, None
             where it is unknown.
+        air
+            That the waves ran in; None: vacuum, or another medium.
+        medium_index
+            Refractive index of that medium. [-]
 
         Raises
         ------
@@ -146,6 +153,8 @@ class Measurement(model.Measurement):
             boresight=np.asarray(boresight, dtype=np.float64),
             clock_offset=clock_offset,
             scenario=scenario,
+            air=air,
+            medium_index=medium_index,
         )
 
     def without_truth(self) -> model.Measurement:
@@ -183,8 +192,12 @@ class Measurement(model.Measurement):
                 ("frequencies", f"{measured.frequencies.size} from {low:.5g} to {high:.5g} GHz"),
             ]
         clock = "unknown" if self.clock_offset is None else f"{1e9 * self.clock_offset:g} ns off"
+        medium = [] if self.air is None else [("air", str(self.air))]
+        if self.medium_index is not None:
+            medium = [("medium", f"of index {self.medium_index:g}")]
         rows = [
             *sweep,
+            *medium,
             ("clock", clock if self.clock_offset else clock.replace("0 ns off", "shared")),
             ("truth", "unknown" if self.beside is None else "beside it"),
             *(("note", note) for note in self.notes),

@@ -19,6 +19,7 @@ from scenes.checks.placement import inconsistencies
 from scenes.checks.points import point_problems
 from scenes.meshes.foreign_scene import with_geometry
 from scenes.meshes.mesh_file import placed_mesh
+from scenes.schema.air import Air
 from scenes.schema.antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
 from scenes.schema.base_station import BaseStation
 from scenes.schema.directions import unit_vector
@@ -38,6 +39,7 @@ from scenes.surfaces.facet_spacing import facet_spacing
 
 __all__ = [
     "MATERIALS",
+    "Air",
     "Antenna",
     "Arc",
     "BaseStation",
@@ -106,6 +108,9 @@ class Scenario(Checked):
     users: dict[Name, User] = Field(default_factory=dict, description="users by name")
     effects: Effects = Field(default_factory=Effects, description="the table [effects]")
     noise: Noise = Field(default_factory=Noise, description="the table [noise]")
+    air: Air | None = Field(
+        None, description="the table [air]: what waves run in; without it, vacuum"
+    )
     impairments: Impairments = Field(
         default_factory=Impairments, description="the table [impairments]"
     )

@@ -14,6 +14,7 @@ from simulator.response.echo import simulate_echo
 from simulator.response.multistatic import multistatic_echo, multistatic_scene
 from simulator.response.point_targets import point_echo, point_uplink
 from simulator.response.uplink import simulate_uplink
+from simulator.scene.air import in_air, measured_air
 from simulator.scene.array_antennas import in_space
 from simulator.scene.radio_scene import facet_ports, radio_scene
 from simulator.scene.truth import scenario_truth
@@ -57,16 +58,17 @@ def simulate(
         If nothing is received, or paths of ``max_bounces`` bounces are too many to compute.
     """
     station, frequencies = scenario.base_station, scenario.radio.frequencies
+    simulated, completed = in_air(scenario)
     flaws = scenario.impairments
     # The measurement reports nominal positions, without the jitter.
     elements = station.element_positions
     advance = _counter("echo", len(elements), progress)
     array: Ports | None = None
     if station.multistatic and scenario.dimensions == 3:
-        apart = multistatic_scene(scenario, seed=seed, sample=sample, realisation=realisation)
+        apart = multistatic_scene(simulated, seed=seed, sample=sample, realisation=realisation)
         scene, echo = apart.radio, multistatic_echo(apart, advance=advance)
     else:
-        scene = radio_scene(scenario, seed=seed, sample=sample, realisation=realisation)
+        scene = radio_scene(simulated, seed=seed, sample=sample, realisation=realisation)
         if scene.facets is not None and not station.multistatic and not in_space(scenario):
             check_chains(
                 scene.mutual_visibility.faces,
@@ -81,7 +83,7 @@ def simulate(
             advance=advance,
             over_several=_teller("echo over several surfaces", progress),
         )
-    signals = {"echo": echo + point_echo(scene)}
+    signals = {"echo": completed(echo + point_echo(scene))}
     for name, user in scenario.users.items():
         advance = _counter(f"uplink of {name}", len(elements), progress)
         uplink = simulate_uplink(
@@ -91,7 +93,7 @@ def simulate(
             advance=advance,
             over_several=_teller(f"uplink of {name} over several surfaces", progress),
         )
-        signals[f"uplink/{name}"] = uplink + point_uplink(scene, user)
+        signals[f"uplink/{name}"] = completed(uplink + point_uplink(scene, user))
     recorded = received(signals, scenario, seed=seed, sample=sample)
     measurement = Measurement(
         echo=Echo(
@@ -112,6 +114,7 @@ def simulate(
         clock_offset=flaws.clock_offset if flaws.clock_known else None,
         scenario=scenario.name,
         seed=seed,
+        air=measured_air(scenario.air),
     )
     return Simulation(measurement=measurement, truth=scenario_truth(scenario))
 

@@ -26,6 +26,7 @@ from estimator.localization.clock import clock_note, on_our_clock
 from estimator.localization.close_up import close_up
 from estimator.localization.frames import local_echo, local_uplink, user_in_world
 from estimator.localization.listed_users import paths_of_list
+from estimator.localization.medium import as_in_vacuum, medium_notes, with_true_times
 from estimator.localization.stages import MappedRoom, Stages
 from estimator.localization.stages_2d import LinearStages
 from estimator.localization.stages_3d import PlanarStages
@@ -116,6 +117,26 @@ def locate(
         the frequency grid is not uniform, samples are of the other time convention, the waves are
         such as an array of its shape cannot take, or a region is empty or comes without an echo.
     """
+    index = measurement.refractive_index
+    found = _in_vacuum(
+        as_in_vacuum(measurement),
+        medium_index=index,
+        region=region,
+        images=images,
+        progress=progress,
+    )
+    users = tuple(with_true_times(user, index) for user in found.users)
+    return replace(found, users=users, notes=found.notes + medium_notes(measurement, users))
+
+
+def _in_vacuum(
+    measurement: Measurement,
+    *,
+    medium_index: float,
+    region: ImageOptions | None,
+    images: bool,
+    progress: Progress | None,
+) -> Estimate:
     if measurement.echo is None and not measurement.uplinks:
         return _by_lists(measurement, region)
     measured = measurement.echo or measurement.uplinks[0]
@@ -166,7 +187,7 @@ def locate(
             found = room.refined(found, local)
         compared = _compared(found, heard.paths, context, local, clock_known=clock_known)
         found, checks = compared.user, (*checks, *compared.checks)
-        notes += clock_note(found)
+        notes += clock_note(with_true_times(found, medium_index))
         users.append(user_in_world(found, frame))
         charts.append(heard.chart)
         if isinstance(heard.chart, AngleRangeMap):

@@ -1,3 +1,4 @@
+from .air import Air
 from .calibration import (
     equalise,
     measured_response,
@@ -13,6 +14,7 @@ from .path_list import PathList
 from .store import is_store, measurement_to_dataset, read_measurement, write_measurement
 
 __all__ = [
+    "Air",
     "Echo",
     "EqualSteps",
     "FocusDelay",

@@ -12,10 +12,12 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float
 
+from estimator.measurement.air import Air
 from estimator.measurement.errors import MeasurementError
 from estimator.measurement.path_list import PathList
 
 __all__ = [
+    "Air",
     "Echo",
     "Measurement",
     "MeasurementError",
@@ -26,6 +28,9 @@ __all__ = [
 ]
 
 Waves = Literal["spherical", "cylindrical"]
+
+LARGEST_INDEX = 20.0
+"""Largest refractive index of a medium that is no mistake: water has 9. [-]"""
 
 UNIFORM_STEP = 1e-6
 """Largest departure from a uniform frequency grid, over the step: 1e-6 of 75 MHz at 2 m of
@@ -92,9 +97,21 @@ class Measurement:
     scenario: str | None = None
     seed: int | None = None
     path_lists: tuple[PathList, ...] = ()  # of users whose channels were not kept
+    air: Air | None = None  # that the waves run in; None: vacuum, or another medium
+    medium_index: float | None = None  # refractive index of another medium [-]
 
     def __post_init__(self) -> None:
         """Refuse a measurement without data."""
+        if self.air is not None and self.medium_index is not None:
+            raise MeasurementError(
+                f"air and medium_index = {self.medium_index:g} are both given; waves run in one "
+                "medium: leave one of them out"
+            )
+        if self.medium_index is not None and not 1 <= self.medium_index <= LARGEST_INDEX:
+            raise MeasurementError(
+                f"medium_index = {self.medium_index:g}; a refractive index lies between 1 and "
+                f"{LARGEST_INDEX:g} (water 9)"
+            )
         length = float(np.linalg.norm(self.boresight))
         if not abs(length - 1) < 1e-6:
             raise MeasurementError(
@@ -120,6 +137,13 @@ class Measurement:
         if self.path_lists and len(set(users)) < len(users):
             twice = next(user for user in users if users.count(user) > 1)
             raise MeasurementError(f"two users are called {twice!r}; name them differently")
+
+    @property
+    def refractive_index(self) -> float:
+        """Of the medium that the waves run in; 1 of vacuum. [-]."""
+        if self.air is not None:
+            return self.air.refractive_index
+        return 1.0 if self.medium_index is None else self.medium_index
 
     @property
     def places(self) -> Float[np.ndarray, "positions 3"]:

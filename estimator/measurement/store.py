@@ -36,7 +36,14 @@ from estimator.measurement.guarded_store import (
 )
 from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.measurement.path_list_store import LISTS, path_list_variables, read_path_lists
-from estimator.measurement.store_attributes import finite_number, unit_boresight, whole_seed
+from estimator.measurement.store_attributes import (
+    AIR_VARIABLES,
+    air_attributes,
+    finite_number,
+    read_air,
+    unit_boresight,
+    whole_seed,
+)
 
 FORMAT = 1
 
@@ -105,6 +112,8 @@ def measurement_to_dataset(measurement: Measurement) -> xr.Dataset:
         "clock_offset_s": measurement.clock_offset,
         "scenario": measurement.scenario,
         "seed": measurement.seed,
+        "medium_index": measurement.medium_index,
+        **air_attributes(measurement.air),
     }
     dataset.attrs |= {key: value for key, value in optional.items() if value is not None}
     return dataset
@@ -291,7 +300,8 @@ _COUNTED = {
 
 def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
     attributes = dict(dataset.attrs)
-    for variable, key in (("boresight", "boresight"), ("clock_offset", "clock_offset_s")):
+    told = (("boresight", "boresight"), ("clock_offset", "clock_offset_s"), *AIR_VARIABLES)
+    for variable, key in told:
         if variable in dataset and np.all(np.isfinite(dataset[variable].values)):
             attributes[key] = dataset[variable].values.tolist()
     version = attributes.get("mmslam_format", FORMAT)
@@ -341,6 +351,8 @@ def _measurement(path: Path, dataset: xr.Dataset) -> Measurement:
         scenario=None if (name := attributes.get("scenario")) is None else str(name),
         seed=whole_seed(path, attributes),
         path_lists=read_path_lists(path, dataset),
+        air=read_air(path, attributes),
+        medium_index=finite_number(path, attributes, "medium_index"),
     )
 
 

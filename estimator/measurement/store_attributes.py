@@ -1,11 +1,19 @@
 """Attributes of a measurement file, checked: they may come from anybody."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
+from estimator.measurement.air import Air
+from estimator.measurement.errors import MeasurementError
 from estimator.measurement.guarded_store import shortened
-from estimator.measurement.model import MeasurementError
+
+AIR_KEYS = {f"air_{name}": name for name in Air.__dataclass_fields__}
+"""Attributes that tell the air, and the quantities that they hold."""
+
+AIR_VARIABLES = tuple((key, key) for key in AIR_KEYS)
+"""Variables of a dataset whose samples differ in it, and the attributes that they stand for."""
 
 _MOST_DIGITS = 30  # of a number that a message shows
 
@@ -47,6 +55,30 @@ def finite_number(path: Path, attributes: dict[str, object], key: str) -> float 
     if isinstance(value, bool) or not np.isfinite(number):
         raise MeasurementError(f"{path}: {key} = {_shown(value)}; it must be a finite number")
     return number
+
+
+def air_attributes(air: Air | None) -> dict[str, float]:
+    """Return the attributes that tell the air; none of vacuum."""
+    values = {} if air is None else asdict(air)
+    return {key: values[name] for key, name in AIR_KEYS.items() if name in values}
+
+
+def read_air(path: Path, attributes: dict[str, object]) -> Air | None:
+    """Read the air, or None where nothing tells it; what is left out of it is a room's.
+
+    Raises
+    ------
+    MeasurementError
+        If a value is no number, or none that air can have.
+    """
+    told = {name: finite_number(path, attributes, key) for key, name in AIR_KEYS.items()}
+    given = {name: value for name, value in told.items() if value is not None}
+    if not given:
+        return None
+    try:
+        return Air(**given)
+    except MeasurementError as error:
+        raise MeasurementError(f"{path}: {error}") from None
 
 
 def whole_seed(path: Path, attributes: dict[str, object]) -> int | None:

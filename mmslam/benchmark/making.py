@@ -10,6 +10,7 @@ import numpy as np
 import zarr
 
 from estimator.measurement.store import PARAMETERS, TRUTH
+from estimator.measurement.store_attributes import AIR_KEYS
 from mmslam.benchmark.recipe import Recipe, load_recipe, space_of
 from mmslam.learning.part_store import write_part
 from mmslam.learning.stored_samples import SIGNALS
@@ -30,6 +31,7 @@ TOLD = (
     "dimensions",
     "boresight",
     "clock_offset_s",
+    *AIR_KEYS,
 )
 """Attributes of a dataset that a part keeps: without the clock's offset no delay is a length."""
 

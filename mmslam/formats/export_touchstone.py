@@ -6,6 +6,7 @@ same measurement, bit for bit (but for its seed, and for a truth, which is not e
 
 import csv
 import io
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,8 @@ def export_touchstone(measurement: Measurement, folder: Path) -> int:
         if measurement.clock_offset is None
         else measurement.clock_offset * 1e9,
         "scenario": measurement.scenario,
+        "refractive_index": measurement.medium_index,
+        "air": None if measurement.air is None else asdict(measurement.air),
     }
     count = 0
     if echo := measurement.echo:

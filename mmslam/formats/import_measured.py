@@ -87,8 +87,8 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
     stepped = mapping.time is None and mapping.chirp is None
     if mapping.refractive_index != 1.0:
         notes.append(
-            f"{source}: in a medium of refractive index {mapping.refractive_index:g}: frequencies "
-            "are stored times it, lengths are the medium's"
+            f"{source}: in a medium of refractive index {mapping.refractive_index:g}: lengths are "
+            "the medium's"
         )
     given = np.array(mapping.boresight) if "boresight" in mapping.model_fields_set else None
     boresight, remark = None, None
@@ -111,7 +111,6 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             notes.append(f"{source}: echo: {refocused}")
         notes += focus_notes(f"{source}: echo", echo, boresight, clock_known=True)
         notes += _notes(source, "echo", echo, found, stepped=stepped)
-        echo = _in_medium(echo, mapping.refractive_index)
     uplinks = []
     for user, table in mapping.uplinks.items():
         name = f"uplinks.{user}"
@@ -130,7 +129,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             f"{source}: {name}", pilot, boresight, clock_known=mapping.clock_offset_ns is not None
         )
         notes += _notes(source, name, pilot, found, stepped=stepped)
-        uplinks.append(_in_medium(pilot, mapping.refractive_index))
+        uplinks.append(pilot)
     assert boresight is not None  # a mapping without any signal is refused
     notes += [] if remark is None else [remark]
     clock = mapping.clock_offset_ns
@@ -143,6 +142,7 @@ def import_measured(source: Path, mapping: SweepMapping, *, base: Path) -> Impor
             clock_offset=None if clock is None else clock / 1e9,
             scenario=mapping.scenario or source.resolve().stem,
             path_lists=lists,
+            **mapping.medium(),
         )
     return Import(measurement=measurement, notes=tuple(dict.fromkeys(notes)))
 
@@ -156,6 +156,7 @@ def _lists_alone(source: Path, mapping: SweepMapping, lists: tuple[PathList, ...
         clock_offset=None if clock is None else clock / 1e9,
         scenario=mapping.scenario or source.resolve().stem,
         path_lists=lists,
+        **mapping.medium(),
     )
     return Import(measurement=measurement, notes=())
 
@@ -224,11 +225,6 @@ def _calibrated(
         with told(f"{name}.cable_delay_ns"):
             data = remove_path(data, delay_by_focus(data, boresight))
     return data
-
-
-def _in_medium(data: Data, index: float) -> Data:
-    """Store the frequencies times the refractive index: wavelengths and delays are the medium's."""
-    return data if index == 1.0 else replace(data, frequencies=data.frequencies * index)
 
 
 def _notes(

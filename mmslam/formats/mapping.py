@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from estimator.measurement.model import MeasurementError
+from mmslam.formats.tables.air_table import AirTable
 from mmslam.formats.tables.frequency_table import FrequencyTable
 from mmslam.formats.tables.path_table import PathTable
 from mmslam.formats.tables.position_table import PositionTable
@@ -39,8 +40,13 @@ class SweepMapping(Checked):
     )
     refractive_index: Annotated[float, Field(ge=1, le=20)] = Field(
         default=1.0,
-        description="of the medium that all waves run in (dry sand 1.6, water 9): frequencies are "
-        "stored times it, so that lengths come out right",
+        description="of the medium that all waves run in, if it is no air (dry sand 1.6, water 9): "
+        "lengths are those in it",
+    )
+    air: AirTable | None = Field(
+        default=None,
+        description="the table of the air that was measured in; without it and refractive_index, "
+        "lengths are those in vacuum",
     )
     clock_offset_ns: float | None = Field(
         default=None, description="the user's clock minus ours; leave it out if it is unknown"
@@ -81,10 +87,20 @@ class SweepMapping(Checked):
             raise ValueError("give one of [frequency], [time] and [chirp]")
         if self.band_ghz is not None and not 0 <= self.band_ghz[0] < self.band_ghz[1]:
             raise ValueError("band_ghz must rise: give the lowest and the highest frequency")
+        if self.air is not None and self.refractive_index != 1.0:
+            raise ValueError("[air] and refractive_index are both there; waves run in one medium")
         for name, signal in self.signals().items():
             if signal.positions is None and self.positions is None:
                 raise ValueError(f"no [positions] for {name}; say where its antenna stood")
         return self
+
+    def medium(self) -> dict[str, Any]:
+        """Return the medium as a measurement's fields."""
+        index = self.refractive_index
+        return {
+            "air": None if self.air is None else self.air.air(),
+            "medium_index": None if index == 1.0 else index,
+        }
 
     def sweep_axis(self) -> str:
         """Return the name of the axis along which each position was measured."""

@@ -98,6 +98,7 @@ def radio_parameters(measurement: Measurement) -> dict[str, str]:
         "positions": f"{len(positions)} over "
         f"{1e3 * np.linalg.norm(np.ptp(positions, axis=0)):.1f} mm",
         "waves": measurement.waves,
+        "medium": _medium(measurement),
     }
     if frequencies.size > 1:
         bandwidth = frequencies[-1] - frequencies[0]
@@ -105,6 +106,13 @@ def radio_parameters(measurement: Measurement) -> dict[str, str]:
         described["range resolution c/2B"] = f"{1e3 * speed_of_light / (2 * bandwidth):.2f} mm"
         described["unambiguous one-way path"] = f"{speed_of_light / step:.2f} m"
     return described
+
+
+def _medium(measurement: Measurement) -> str:
+    if measurement.air is not None:
+        return f"air of {measurement.air}, n = {measurement.refractive_index:.6f}"
+    index = measurement.medium_index
+    return "vacuum" if index is None else f"of refractive index {index:g}"
 
 
 def _fixed(value: float | None, digits: int = 3, scale: float = 1.0) -> str:

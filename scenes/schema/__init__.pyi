@@ -1,3 +1,4 @@
+from .air import Air
 from .antenna import Antenna, Cosine, Directive, GaussianBeam, Horn, Isotropic
 from .base_station import BaseStation
 from .directions import unit_vector
@@ -14,6 +15,7 @@ from .radio import Radio
 from .roughness import Distribution, Roughness, Scale, Spectrum
 
 __all__ = [
+    "Air",
     "Antenna",
     "Arc",
     "BaseStation",

@@ -15,6 +15,7 @@ import numpy as np
 from estimator.measurement.model import Measurement
 from estimator.measurement.store import CONVENTIONS, PARAMETERS, TRUTH
 from estimator.measurement.store import FORMAT as MEASUREMENT_FORMAT
+from estimator.measurement.store_attributes import AIR_KEYS, air_attributes
 from scenes.sampling.sample_space import SampleSpace
 from scenes.scenario import Scenario
 from scenes.schema.errors import ScenarioError
@@ -29,6 +30,14 @@ from simulator.dataset.variables import (
     signal_variables,
     status_variables,
 )
+from simulator.scene.air import measured_air
+
+AIR_TOLD = {
+    "air_temperature_c": {"units": "degC"},
+    "air_pressure_hpa": {"units": "hPa"},
+    "air_humidity_percent": {"units": "%"},
+}
+"""Attributes of the variables that tell the air where it differs among samples."""
 
 BLOCK_BYTES = 32 * 2**20
 """Most bytes of raw samples in one file (a shard), unless one sample is larger. [byte]"""
@@ -124,6 +133,9 @@ def dataset_layout(space: SampleSpace, config: DatasetConfig, example: Scenario)
         variables.append(
             Variable(name="clock_offset", attributes={"units": "s", "long_name": CLOCK})
         )
+    air_varies = space.varies("air")
+    if air_varies:
+        variables += [Variable(name=key, attributes=AIR_TOLD[key]) for key in AIR_KEYS]
     return Layout(
         samples=config.samples,
         variables=tuple(variables),
@@ -131,7 +143,9 @@ def dataset_layout(space: SampleSpace, config: DatasetConfig, example: Scenario)
             *_names(users, walls, targets),
             *_fixed(example, fixed_array=fixed_array, fixed_band=fixed_band),
         ),
-        attributes=_attributes(space, config, example, clock_varies=clock_varies),
+        attributes=_attributes(
+            space, config, example, clock_varies=clock_varies, air_varies=air_varies
+        ),
         users=users,
         walls=walls,
         targets=targets,
@@ -183,7 +197,12 @@ def _fixed(example: Scenario, *, fixed_array: bool, fixed_band: bool) -> list[Co
 
 
 def _attributes(
-    space: SampleSpace, config: DatasetConfig, example: Scenario, *, clock_varies: bool
+    space: SampleSpace,
+    config: DatasetConfig,
+    example: Scenario,
+    *,
+    clock_varies: bool,
+    air_varies: bool,
 ) -> dict[str, Any]:
     flaws = example.impairments
     attributes: dict[str, Any] = {
@@ -201,6 +220,8 @@ def _attributes(
         attributes["boresight"] = example.base_station.boresight.tolist()
     if flaws.clock_known and not clock_varies:
         attributes["clock_offset_s"] = flaws.clock_offset
+    if not air_varies:
+        attributes |= air_attributes(measured_air(example.air))
     return attributes
 
 

@@ -9,6 +9,7 @@ from scipy.constants import speed_of_light
 
 from estimator.measurement.model import Measurement
 from estimator.measurement.store import PARAMETERS, TRUTH
+from estimator.measurement.store_attributes import air_attributes
 from scenes.sampling.drawn_parameters import Parameter
 from scenes.sampling.frozen_rooms import first_sample, room_number
 from scenes.sampling.sample_space import Attempt, SampleSpace, impossible_sample
@@ -16,6 +17,7 @@ from scenes.scenario import Scenario, ScenarioError
 from scenes.schema.objects import Plate
 from simulator.dataset.layout import Layout, fits
 from simulator.dataset.variables import FAILED, MADE
+from simulator.materials.gas_absorption import refractive_index
 
 Row = dict[str, np.ndarray]
 """Values of every variable of the layout, by its key."""
@@ -146,6 +148,9 @@ def _put_geometry(row: Row, scenario: Scenario, measurement: Measurement) -> Non
         frequencies = scenario.radio.frequencies
         row["frequency"][: len(frequencies)] = frequencies
         row["frequency_count"] = np.array(len(frequencies), dtype="i4")
+    for key, value in air_attributes(measurement.air).items():
+        if key in row:
+            row[key] = np.array(value, dtype="f8")
     if "clock_offset" in row and measurement.clock_offset is not None:
         row["clock_offset"] = np.array(measurement.clock_offset, dtype="f8")
 
@@ -191,7 +196,7 @@ def _put_paths(row: Row, layout: Layout, scenario: Scenario) -> None:
         values = {
             "path_angle": np.arccos(np.clip(towards @ axis, -1.0, 1.0)),
             "path_elevation": np.arcsin(np.clip(towards[2], -1.0, 1.0)),
-            "path_delay": path.length / speed_of_light,
+            "path_delay": path.length * refractive_index(scenario.air) / speed_of_light,
             "path_bounces": path.bounces,
             "path_antenna_gain": path.gain_db,
             "path_slabs": len(path.through),

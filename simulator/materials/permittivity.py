@@ -133,8 +133,30 @@ class TabulatedPermittivity:
         return values
 
 
+@dataclass(frozen=True, kw_only=True)
+class PermittivityInMedium:
+    """A permittivity relative to that of the medium around, over the frequencies times its index.
+
+    Beyond the band it is that of the band's end.
+    """
+
+    permittivity: "Permittivity"
+    refractive_index: float  # of the medium [-]
+    band: tuple[float, float]  # of the radio's own frequencies [Hz]
+
+    def __call__(self, frequencies: Float[np.ndarray, " freqs"]) -> Complex[np.ndarray, " freqs"]:
+        """Evaluate it at the frequencies over the index."""
+        own = np.clip(frequencies / self.refractive_index, *self.band)
+        relative: np.ndarray = self.permittivity(own) / self.refractive_index**2
+        return relative
+
+
 Permittivity = (
-    ConstantPermittivity | PowerLawPermittivity | JoinedPermittivity | TabulatedPermittivity
+    ConstantPermittivity
+    | PowerLawPermittivity
+    | JoinedPermittivity
+    | TabulatedPermittivity
+    | PermittivityInMedium
 )
 """Complex relative permittivity as a function of frequency."""
 

@@ -28,6 +28,7 @@ from simulator.materials.permittivity import (
     ConstantPermittivity,
     MaterialError,
     Permittivity,
+    PermittivityInMedium,
     PowerLawPermittivity,
     read_permittivity,
 )
@@ -39,6 +40,7 @@ from simulator.materials.slab_insertion import (
     through_slabs,
 )
 from simulator.receiver.impairments import position_jitter
+from simulator.scene.air import RadioInMedium
 from simulator.scene.array_antennas import array_group, in_space, needed_reach, sending_group
 from simulator.scene.level_of_detail import mirrored_bodies
 from simulator.scene.scene_mirrors import SceneMirrors, scene_mirrors
@@ -226,18 +228,31 @@ def scenario_materials(scenario: Scenario) -> dict[str, Material]:
         If a material is not known over the band, its coefficients ripple too fast to be
         interpolated, or its table of permittivity cannot be read; the message names the key.
     """
-    frequencies = scenario.radio.frequencies
+    radio = scenario.radio
+    frequencies = radio.frequencies
+    known = np.array(radio.band) if isinstance(radio, RadioInMedium) else frequencies
     made: dict[str | Slab, Material] = {}
     for name, body in scenario.objects.items():
         if body.material in made:
             continue
         try:
-            material = _material(body.material, frequencies)
+            material = _material(body.material, known)
+            if isinstance(radio, RadioInMedium):
+                material = _in_medium(material, radio)
             reflection_nodes(material, float(frequencies[0]), float(frequencies[-1]))
         except MaterialError as error:
             raise ScenarioError(f"objects.{name}.material: {error}") from None
         made[body.material] = material
     return {name: made[body.material] for name, body in scenario.objects.items()}
+
+
+def _in_medium(material: Material, radio: RadioInMedium) -> Material:
+    if not isinstance(material, Dielectric):
+        return material
+    relative = PermittivityInMedium(
+        permittivity=material.permittivity, refractive_index=radio.refractive_index, band=radio.band
+    )
+    return replace(material, permittivity=relative)
 
 
 def _material(material: str | Slab, frequencies: Float[np.ndarray, " freqs"]) -> Material:

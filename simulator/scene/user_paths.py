@@ -1,6 +1,6 @@
 """The specular paths between each user and the middle of the array, with complex gains."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -9,6 +9,8 @@ from jaxtyping import Float
 from scenes.scenario import Scenario
 from simulator.geometry.mirrors import Mirrors
 from simulator.geometry.ray_scene import blocked
+from simulator.materials.gas_absorption import refractive_index
+from simulator.scene.air import absorbed, wavelengths_of_air
 from simulator.scene.array_antennas import array_group, user_group
 from simulator.scene.radio_scene import RadioScene, radio_scene
 from simulator.scene.scene_mirrors import SceneMirrors
@@ -58,7 +60,7 @@ def user_paths(
     ValueError
         If the scenario has two dimensions, or no bounce.
     """
-    scene = radio_scene(scenario, seed=0, sample=0)
+    scene = radio_scene(wavelengths_of_air(scenario), seed=0, sample=0)
     if scene.mirrors is None:
         raise ValueError(
             f"scenario {scenario.name!r}: dimensions = {scenario.dimensions}, max_bounces = "
@@ -66,11 +68,13 @@ def user_paths(
         )
     end = scene.elements.mean(axis=0) if place is None else place
     at = np.array([scenario.radio.centre_frequency if frequency is None else frequency])
+    at *= refractive_index(scenario.air)
     found = {}
     for name in scenario.users:
         chains = _chains(scene, scene.mirrors, name, end)
         mirrors = scene.mirrors.mirrors
         paths = [_path(scene, mirrors, name, end, chain, at) for chain in chains]
+        paths = [_weakened(scenario, path, at) for path in paths]
         found[name] = tuple(sorted(paths, key=lambda one: -abs(one.gain)))
     return found
 
@@ -115,3 +119,7 @@ def _path(
         gain=complex(response[0]),
         slabs=tuple(len(scene.slabs.crossings(one)) if one else 0 for one in crossed),
     )
+
+
+def _weakened(scenario: Scenario, path: UserPath, at: Float[np.ndarray, " one"]) -> UserPath:
+    return replace(path, gain=path.gain * float(absorbed(scenario, at, path.length)[0]))

@@ -126,6 +126,11 @@ def full_wave_scenario(
     ScenarioError
         If it cannot be solved for, or exceeds the limits of unknowns or memory.
     """
+    if scenario.air is not None:
+        raise ScenarioError(
+            f"scenario {scenario.name!r}: air: full wave is solved in vacuum; leave the table "
+            "[air] out"
+        )
     bodies = scenario_bodies(scenario, seed=seed, sample=sample)
     frequencies = scenario.radio.frequencies
     sampled = bodies.at(float(frequencies[-1]))

@@ -1,3 +1,4 @@
+from .air_table import AirTable
 from .frequency_table import FrequencyTable
 from .path_table import PathTable
 from .position_table import PositionTable
@@ -5,6 +6,7 @@ from .signal_tables import EchoTable, RawTable, ResponseTable, SamplesTable, Sig
 from .time_tables import ChirpTable, TimeTable
 
 __all__ = [
+    "AirTable",
     "ChirpTable",
     "EchoTable",
     "FrequencyTable",

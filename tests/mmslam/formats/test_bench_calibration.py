@@ -9,6 +9,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from estimator.imaging.autofocus import contributions
+from estimator.localization.medium import as_in_vacuum
 from estimator.measurement.model import Echo, MeasurementError
 from mmslam.formats.import_measured import Import
 from validation.metrics.image_quality import image_entropy
@@ -62,7 +63,12 @@ def test_in_a_medium_lengths_come_out_by_its_refractive_index(
     imported = take(tmp_path, "s.npz", mapping)
     assert imported.measurement.echo is not None
     echo = imported.measurement.echo
-    np.testing.assert_allclose(echo.samples, echo_of(echo.positions, echo.frequencies), atol=1e-13)
+    assert imported.measurement.medium_index == 1.5
+    np.testing.assert_allclose(echo.frequencies, FREQUENCIES, rtol=1e-15)  # to their rounding
+    in_vacuum = as_in_vacuum(imported.measurement).echo
+    assert in_vacuum is not None
+    wanted = echo_of(echo.positions, in_vacuum.frequencies)
+    np.testing.assert_allclose(echo.samples, wanted, atol=1e-13)
     assert any("refractive index 1.5" in note for note in imported.notes)
 
 
