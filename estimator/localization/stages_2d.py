@@ -19,7 +19,6 @@ from estimator.channel.path_extraction_2d import find_paths
 from estimator.geometry.lateness import combined
 from estimator.imaging.look_aside_2d import peaks_aside
 from estimator.imaging.point_levels import point_levels_db
-from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes, range_notes
 from estimator.localization.close_range import close_scene
 from estimator.localization.constant_room import RoomBehindConstant
@@ -27,7 +26,7 @@ from estimator.localization.imaged_scene import imaged_scene
 from estimator.localization.stages import Heard, MappedRoom
 from estimator.mapping.map_2d import RoomMap, build_room_map, mirrors_in_world, targets_in_world
 from estimator.mapping.map_images_2d import room_images
-from estimator.measurement.model import Echo, Measurement, Uplink
+from estimator.measurement.model import Echo, Measurement, MeasurementError, Uplink
 from estimator.positioning.diffuse_fallback import with_diffuse_search
 from estimator.positioning.map_context import MapContext
 from estimator.results.estimate import (
@@ -121,8 +120,11 @@ class LinearStages:
 
     def _mapped(self, echo: Echo) -> MappedRoom:
         nearest = NEAREST * float(np.ptp(echo.positions[:, 0]))
-        if unambiguous_path(echo.frequencies) / 2 < nearest:
-            echo_reach(echo)  # refuses it: all ranges would seem close
+        try:
+            echo_reach(echo)
+        except MeasurementError as cause:  # a room's survey has no ranges left
+            told = f"{cause}; anything farther away appears at a wrong place"
+            return imaged_scene(echo, view=OWN, reason=told)
         reason = close_scene(echo, nearest=nearest, planar=False)
         if reason is not None:
             return imaged_scene(echo, view=OWN, reason=reason)

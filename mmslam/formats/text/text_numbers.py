@@ -2,13 +2,15 @@
 
 Supported are RFC 4180 (quoted names with commas in them), semicolons with decimal commas, tabs and
 blanks, names in a remark above the numbers (CST), a line of units below them, analysers' BEGIN and
-END, complex numbers (``1.5-2i``), files without names, and texts in UTF-8, UTF-16 or Windows' own
-code.
+END, complex numbers (``1.5-2i``; magnitude and degrees as ADS writes them, ``0.2 / -30.5``), files
+without names, and texts in UTF-8, UTF-16 or Windows' own code.
 """
 
+import cmath
 import csv
 import io
 import itertools
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -255,6 +257,9 @@ def _is_complex(text: str) -> bool:
 
 def _complex(text: str) -> complex:
     plain = "".join(itertools.chain(text.split()))
+    size, polar, angle = plain.partition("/")
+    if polar:
+        return cmath.rect(float(size), math.radians(float(angle)))
     return complex(plain[:-1] + "j" if plain.endswith("i") else plain)
 
 

@@ -199,3 +199,12 @@ def test_a_flat_letter_at_a_metre_is_no_mirror_and_has_no_ghosts() -> None:
     (target,) = estimate.targets
     assert abs(target.position[1] - 1.0) < 0.02  # half a range cell of 37 mm
     assert any("no mirror was found: imaged by" in note for note in estimate.notes)
+
+
+def test_a_line_whose_frequencies_leave_no_room_is_imaged() -> None:
+    """A ground-penetrating radar's: 0.75 m unambiguous, positions over 0.5 m."""
+    line = np.stack([np.linspace(-0.25, 0.25, 181), np.zeros(181), np.zeros(181)], axis=-1)
+    place = np.array([0.04, 0.3, 0.0])
+    estimate = located(echo_of(place, line))
+    assert_found_alone(estimate, place)
+    assert any("unambiguous to 0.749 m only" in note for note in estimate.notes)

@@ -262,6 +262,28 @@ def test_tables_of_several_programs_name_their_columns(
     assert_is_the_point(taken(tmp_path, "s.txt", mapping), tolerance=1e-9)  # 1 ulp of 34 GHz
 
 
+def test_magnitude_and_degrees_in_one_column_are_read(
+    tmp_path: Path,
+    taken: Callable[[Path, str, str], Echo],
+    echo_of: Callable[..., np.ndarray],
+    assert_is_the_point: Callable[..., None],
+) -> None:
+    """ADS writes polar numbers so."""
+    places = plane()[:5]
+    lines = ["xpos\tfreq\tS(1,1)"]
+    for place, row in zip(places, echo_of(places), strict=True):
+        for frequency, sample in zip(FREQUENCIES, row, strict=True):
+            polar = f"{float(abs(sample))!r} / {float(np.degrees(np.angle(sample)))!r}"
+            lines.append(f"{float(place[0])!r}\t{float(frequency)!r}\t{polar}")
+    (tmp_path / "s.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    mapping = """
+        frequency = { variable = "freq", unit = "Hz" }
+        positions = { x = "xpos", z = -0.004, unit = "m" }
+        echo = { variable = "S(1,1)" }
+    """
+    assert_is_the_point(taken(tmp_path, "s.txt", mapping), tolerance=1e-9)
+
+
 @pytest.mark.parametrize("imaginary_unit", ["i", "j"])
 def test_a_plain_matrix_of_text_needs_no_names(
     tmp_path: Path,
