@@ -19,6 +19,7 @@ from estimator.channel.path_extraction_2d import find_paths
 from estimator.geometry.lateness import combined
 from estimator.imaging.look_aside_2d import peaks_aside
 from estimator.imaging.point_levels import point_levels_db
+from estimator.imaging.range_compression import unambiguous_path
 from estimator.localization.aliasing import aliasing_notes, range_notes
 from estimator.localization.close_range import close_scene
 from estimator.localization.constant_room import RoomBehindConstant
@@ -120,6 +121,8 @@ class LinearStages:
 
     def _mapped(self, echo: Echo) -> MappedRoom:
         nearest = NEAREST * float(np.ptp(echo.positions[:, 0]))
+        if unambiguous_path(echo.frequencies) / 2 < nearest:
+            echo_reach(echo)  # refuses it: all ranges would seem close
         try:
             echo_reach(echo)
         except MeasurementError as cause:  # a room's survey has no ranges left
