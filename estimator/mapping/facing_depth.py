@@ -45,7 +45,7 @@ DEPTHS = 10
 ROUNDS = 2
 """Rounds after the first: the last is 1/16 of the first's step. [-]"""
 ITERATIONS = 15
-"""Of conjugate gradients, which explain 99 % of a letter at an SNR of 20 dB. [-]"""
+"""Of conjugate gradients: they explained 99 % of one letter at an SNR of 20 dB. [-]"""
 EXPLAINED = 0.85
 """Share of the energy that the surface must explain: nothing else is there. [-]"""
 BETTER = 0.5

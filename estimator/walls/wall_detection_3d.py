@@ -79,8 +79,8 @@ FLASH_CELLS = 4.0
 no more than the array's reflection: a small plate does so as well, and a constant. [cells]"""
 UNIFORM = 0.8
 """Share of the energy around its distance that a mirror's flat wave explains, of which no more is
-seen than that wave: a mirror as wide as the array returns the same to all positions. Letters at 1 m
-with strokes of two cells explain at most half. [-]"""
+seen than that wave: a mirror as wide as the array returns the same to all positions. The waves of
+three letters at 1 m explained 0.38, 0.41 and 0.59; a mirror's was not measured. [-]"""
 INNER = 0.7
 """Where between its centre and its corners a polygon is sampled as well: half of its area is
 inside. [-]"""
