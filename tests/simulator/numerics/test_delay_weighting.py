@@ -10,7 +10,7 @@ SPEED = 299792458.0
 
 
 def paths(frequencies: np.ndarray, delays: np.ndarray) -> Complex[np.ndarray, "1 freqs"]:
-    return np.exp(-2j * np.pi * np.outer(delays, frequencies)).sum(axis=0)[None]
+    return np.asarray(np.exp(-2j * np.pi * np.outer(delays, frequencies)).sum(axis=0)[None])
 
 
 @pytest.mark.parametrize(

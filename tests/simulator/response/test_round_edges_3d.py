@@ -52,7 +52,7 @@ def corners(body: dict[str, Any]) -> Float[np.ndarray, "4 3"]:
     across, up = body["length_m"] / 2, body["height_m"] / 2
     signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     turned = np.stack([signs[:, 0] * across, np.zeros(4), signs[:, 1] * up], axis=-1)
-    return np.array(body["centre_m"]) + turned
+    return np.asarray(np.array(body["centre_m"]) + turned)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from scipy.constants import speed_of_light
 
 from scenes.files.loading import load_scenario
 from scenes.scenario import ScenarioError
+from simulator.materials.fresnel_slab import Dielectric
 from simulator.materials.gas_absorption import attenuation_db_km, refractive_index
 from simulator.scene.air import in_air, longest_path
 from simulator.scene.radio_scene import scenario_materials
@@ -42,10 +43,14 @@ def test_a_slab_keeps_its_own_wavelength_in_air() -> None:
     made, _ = in_air(glass)
     (material,) = scenario_materials(made).values()
     (own,) = scenario_materials(glass).values()
+    assert isinstance(material, Dielectric)
+    assert isinstance(own, Dielectric)
     index = refractive_index(glass.air)
     f = glass.radio.frequencies
-    inside = [g * np.sqrt(one.permittivity(g)) for one, g in ((material, f * index), (own, f))]
-    np.testing.assert_allclose(*inside, rtol=1e-12)
+    inside, expected = (
+        g * np.sqrt(one.permittivity(g)) for one, g in ((material, f * index), (own, f))
+    )
+    np.testing.assert_allclose(inside, expected, rtol=1e-12)
 
 
 def test_vacuum_is_not_touched() -> None:
