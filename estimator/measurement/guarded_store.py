@@ -165,7 +165,13 @@ class GuardedStore(WrapperStore[LocalStore]):
 
     def _check_chunks(self, key: str, content: bytes) -> None:
         metadata = json.loads(content)
-        if not isinstance(metadata, dict) or metadata.get("node_type") != "array":
+        if not isinstance(metadata, dict):
+            return
+        if not isinstance(metadata.get("attributes", {}), dict):
+            raise MeasurementError(
+                f"{self._path}: the attributes in {key} are no table; it is damaged: write it again"
+            )
+        if metadata.get("node_type") != "array":
             return
         shape = metadata["chunk_grid"]["configuration"]["chunk_shape"]
         if math.prod(shape) * _WIDEST > LARGEST_CHUNK:

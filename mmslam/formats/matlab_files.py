@@ -7,6 +7,7 @@ import numpy as np
 
 from estimator.measurement.model import MeasurementError
 from mmslam.formats.hdf5_files import hdf5_array, is_hdf5
+from mmslam.formats.matlab_elements import check_elements
 
 _INTEGERS = ("int8", "int16", "int32", "int64")
 NUMBERS = ("double", "single", *_INTEGERS, *(f"u{kind}" for kind in _INTEGERS))
@@ -35,6 +36,7 @@ def matlab_array(path: Path, name: str, *, largest: int) -> np.ndarray:
     variable, *fields = name.split(".")
     from scipy.io import loadmat, whosmat
 
+    check_elements(path)
     try:
         listed = {found[0]: (found[1], found[2]) for found in whosmat(path)}
         _check_listed(path, variable, fields, listed, largest)

@@ -1,18 +1,23 @@
 """Inputs that once gave a traceback, hung, or took the memory: each is refused by a message."""
 
 import json
+import struct
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from estimator.measurement.model import Echo, Measurement, MeasurementError
-from estimator.measurement.store import write_measurement
+from estimator.measurement.store import read_measurement, write_measurement
 from mmslam.commands.track import _times
 from mmslam.formats.array_files import ArrayFiles
 from mmslam.formats.export_arrays import export_matlab
 from mmslam.formats.file_pattern import fields_of_pattern
+from mmslam.formats.mapping import checked_mapping
+from mmslam.formats.matlab_elements import check_elements
+from mmslam.formats.matlab_files import matlab_array
 from mmslam.location import default_folder
 from scenes.files.loading import load_scenario
 from scenes.meshes.mitsuba_xml import read_mitsuba_xml
@@ -31,6 +36,46 @@ MEASUREMENT = Measurement(
     ),
     uplinks=(),
 )
+
+
+@pytest.mark.parametrize("kind", [8, 10, 19, 200, 0x7FFFFFFF])
+def test_an_element_of_matlab_of_an_unknown_type_ends_no_process(kind: int, tmp_path: Path) -> None:
+    # SciPy looks its type up in a table of twenty: a segmentation fault.
+    path = tmp_path / "it.mat"
+    savemat(path, {"echo": np.ones((3, 4)) + 1j})
+    content = path.read_bytes()
+    at = content.find(struct.pack("<II", 9, 96))  # the tag of twelve doubles
+    path.write_bytes(content[:at] + struct.pack("<I", kind) + content[at + 4 :])
+    with pytest.raises(MeasurementError, match="damaged"):
+        matlab_array(path, "echo", largest=10**6)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("deep", [False, True])
+def test_sound_files_of_matlab_pass_the_check(packed: bool, deep: bool, tmp_path: Path) -> None:
+    path = tmp_path / "it.mat"
+    odd = np.arange(5, dtype=np.int8) * 1.0
+    content = {"a": {"b": {"echo": odd, "n": "text"}}} if deep else {"echo": odd, "ü": [1, 2]}
+    savemat(path, content, do_compression=packed)
+    check_elements(path)
+    if not deep:
+        np.testing.assert_array_equal(matlab_array(path, "echo", largest=99).ravel(), odd)
+
+
+def test_attributes_that_are_no_table_are_refused_by_every_reader(tmp_path: Path) -> None:
+    store = tmp_path / "it.zarr"
+    write_measurement(store, MEASUREMENT)
+    at = store / "aperture_position" / "zarr.json"
+    at.write_text(json.dumps(json.loads(at.read_text()) | {"attributes": 0}))
+    with pytest.raises(MeasurementError, match="attributes in aperture_position"):
+        export_matlab(store, tmp_path / "it.mat")
+    with pytest.raises(MeasurementError, match="attributes in aperture_position"):
+        read_measurement(store)
+
+
+def test_a_delay_of_400_digits_is_refused() -> None:
+    with pytest.raises(MeasurementError, match="finite"):
+        checked_mapping({"echo": {"variable": "echo", "cable_delay_ns": 10**400}})
 
 
 @pytest.mark.parametrize("name", ["x" * 5000, "a\0b", "a\0b.toml", "/" + "x" * 5000])

@@ -37,9 +37,16 @@ class RawTable(Checked):
 def _delay_or_focus(value: object) -> float | Literal["focus"]:
     if value == "focus":
         return "focus"
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise PydanticCustomError("delay", "must be a finite number, or 'focus'")
-    return float(value)
+    refused = PydanticCustomError("delay", "must be a finite number, or 'focus'")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise refused
+    try:
+        delay = float(value)
+    except OverflowError:  # an integer of 309 digits and more
+        raise refused from None
+    if not isfinite(delay):
+        raise refused
+    return delay
 
 
 DelayOrFocus = Annotated[
