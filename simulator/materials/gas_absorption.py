@@ -51,7 +51,7 @@ def attenuation_db_km(
     Examples
     --------
     >>> attenuation_db_km(Air(temperature_c=15.0, humidity_percent=0.0), np.array([60e9])).round(1)
-    array([14.6])
+    array([14.7])
     """
     ghz = frequencies / 1e9
     kelvin = air.temperature_c + 273.15

@@ -1,6 +1,6 @@
 """The ground truth stored with a measurement: read for comparisons only, never by the estimator."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,30 @@ class Truth:
     target_size: Points = field(default_factory=dict)  # along length, depth, height [m]
     target_angle: dict[str, float] = field(default_factory=dict)  # of the length from +x [rad]
     target_kind: dict[str, str] = field(default_factory=dict)  # point, cylinder, box, mesh
+
+
+def with_box_faces(truth: Truth) -> Truth:
+    """Return a truth whose boxes' faces are walls as well, named as in "cabinet, face 2".
+
+    A box's flat faces mirror as walls do, and an image does not tell the ones from the others.
+    """
+    start, end = dict(truth.wall_start), dict(truth.wall_end)
+    for name, kind in truth.target_kind.items():
+        if kind != "box" or name not in truth.target_size:
+            continue
+        angle = truth.target_angle.get(name, 0.0)
+        along = np.array([np.cos(angle), np.sin(angle), 0.0])
+        across = np.array([-along[1], along[0], 0.0])
+        half = 0.5 * truth.target_size[name]
+        signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        corners = [
+            truth.target_position[name] + x * half[0] * along + y * half[1] * across
+            for x, y in signs
+        ]
+        for number in range(4):
+            start[f"{name}, face {number}"] = corners[number]
+            end[f"{name}, face {number}"] = corners[(number + 1) % 4]
+    return replace(truth, wall_start=start, wall_end=end)
 
 
 def front_face(

@@ -11,7 +11,7 @@ from estimator.results.estimate import Estimate, UserEstimate
 from validation.metrics.coverage import normalised_square
 from validation.metrics.mirror_check import seen_mirrors, wall_square
 from validation.metrics.target_association import target_distances
-from validation.metrics.truth import Truth
+from validation.metrics.truth import Truth, with_box_faces
 from validation.random_rooms.oracle import Answerable
 
 Verdict = Literal["right", "wrong", "open, truth among them", "open, truth not among them", "none"]
@@ -50,7 +50,7 @@ class RoomScore:
     bound: float | None  # largest deviation by the Cramér-Rao bound, walls known [m]
     shown: tuple[str, ...]  # walls that the echo shows
     found: tuple[str, ...]  # walls on which a mirror was reported
-    false_mirrors: int  # reported with confidence above 0.99, on no wall
+    false_mirrors: int  # reported with confidence above 0.99, on no wall and no face of a box
     doubtful_mirrors: int  # the same, with less
     wall_squares: tuple[float, ...]  # normalised squares of right mirrors' errors, in 2-D [-]
     targets: int
@@ -92,7 +92,8 @@ def score_room(
         verdict = "right" if right and right[0] else "wrong"
     elif user.status == "ambiguous":
         verdict = "open, truth among them" if any(right) else "open, truth not among them"
-    mirrors = seen_mirrors(estimate, truth)
+    walled = with_box_faces(truth)
+    mirrors = seen_mirrors(estimate, walled)
     false = [one.confidence for one in mirrors if one.wall is None]
     at_something, on_walls = target_distances(estimate.targets, truth)
     return RoomScore(
@@ -118,7 +119,7 @@ def score_room(
         false_mirrors=sum(confidence > CONFIDENT for confidence in false),
         doubtful_mirrors=sum(confidence <= CONFIDENT for confidence in false),
         wall_squares=tuple(
-            wall_square(mirror, truth, seen.wall)
+            wall_square(mirror, walled, seen.wall)
             for mirror, seen in zip(estimate.mirrors, mirrors, strict=True)
             if flat and seen.wall is not None
         ),

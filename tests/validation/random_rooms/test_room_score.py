@@ -99,3 +99,23 @@ def test_a_summary_counts_what_the_scores_say() -> None:
 def test_no_scores_are_refused() -> None:
     with pytest.raises(ValueError, match="no rooms"):
         summarise(())
+
+
+@pytest.mark.parametrize(("turned", "false"), [(0.0, 0), (0.05, 1)])
+def test_a_mirror_on_the_face_of_a_box_is_not_false(turned: float, false: int) -> None:
+    # The front of a box turned by 20°, 6 cm deep, through the middle of the mirror.
+    angle = np.radians(20.0)
+    inward = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    box = replace(
+        TRUTH,
+        wall_start={},
+        wall_end={},
+        target_position={"box": np.array([0.0, 0.4, 0.0]) + 0.03 * inward},
+        target_size={"box": np.array([0.24, 0.06, 0.0])},
+        target_kind={"box": "box"},
+        target_angle={"box": angle},
+    )
+    estimate = Estimate(users=(user(0.1, 0.5),), mirrors=(mirror(angle + turned),), targets=())
+    scored = score_room("room", estimate, box, ORACLE, flat=True, seconds=1.0)
+    assert scored.false_mirrors == false
+    assert scored.found == (() if false else ("box, face 0",))
