@@ -13,6 +13,8 @@ NAME_TAG, TABLE_TAG = "[name]", "[table]"
 """Mark in pydantic's locations whether a name or a table was read; no key of a scenario's."""
 
 _LONGEST_TEXT = 200  # of what a message repeats, in characters
+MOST_PROBLEMS = 50
+"""Most problems of one input that are told: a list of thousands of wrong items has one each. [-]"""
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
@@ -64,13 +66,16 @@ def problems(
         that overlap.
     """
     lines: list[str] = []
-    for finding in error.errors(include_url=False):
+    findings = error.errors(include_url=False)
+    for finding in findings[:MOST_PROBLEMS]:
         context: dict[str, Any] = finding.get("ctx", {})
         if "problems" in context:  # found after all keys were read, one line each
             lines += [] if of_keys_only else context["problems"]
             continue
         place = _place(finding["loc"], model)
         lines.append(_line(place, finding["type"], finding["msg"], context, finding["input"]))
+    if len(findings) > MOST_PROBLEMS:
+        lines.append(f"… and {len(findings) - MOST_PROBLEMS} more problems; mend these first")
     return list(dict.fromkeys(lines))
 
 

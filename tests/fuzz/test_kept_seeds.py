@@ -73,6 +73,12 @@ def test_attributes_that_are_no_table_are_refused_by_every_reader(tmp_path: Path
         read_measurement(store)
 
 
+def test_of_a_list_of_thousands_of_wrong_items_some_are_told() -> None:
+    with pytest.raises(MeasurementError, match="more problems") as refused:
+        checked_mapping({"echo": {"variable": "echo", "axes": [1] * 9000}})
+    assert len(str(refused.value)) < 20_000
+
+
 def test_a_delay_of_400_digits_is_refused() -> None:
     with pytest.raises(MeasurementError, match="finite"):
         checked_mapping({"echo": {"variable": "echo", "cable_delay_ns": 10**400}})
