@@ -316,11 +316,20 @@ def _key(name: str) -> str:
     return f"{plain[: LONGEST_NAME - 9]}_{digest}"
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file system takes
+        return False
+
+
 def _mesh_file(path: Path, name: str, folders: tuple[Path, ...]) -> Path:
     if Path(name).suffix.lower().removeprefix(".") not in FORMATS:
-        raise refusal(path, f"mesh {name!r}: only PLY and OBJ files are read; export it as PLY")
+        raise refusal(
+            path, f"mesh {shown_text(name)!r}: only PLY and OBJ files are read; export it as PLY"
+        )
     places = [_within(path, folder, name, home=folders[0]) for folder in folders]
-    return next((place for place in places if place.is_file()), places[0])
+    return next((place for place in places if _is_file(place)), places[0])
 
 
 def _within(path: Path, folder: Path, name: str, *, home: Path | None = None) -> Path:

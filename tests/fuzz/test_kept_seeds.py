@@ -73,6 +73,19 @@ def test_attributes_that_are_no_table_are_refused_by_every_reader(tmp_path: Path
         read_measurement(store)
 
 
+@pytest.mark.parametrize("name", ["9" * 5000 + ".ply", "9" * 5000])
+def test_a_mesh_name_that_no_file_system_takes_is_told_by_us(name: str, tmp_path: Path) -> None:
+    scene = tmp_path / "it.xml"
+    scene.write_text(
+        '<scene version="2.1.0"><shape type="ply" id="a">'
+        f'<string name="filename" value="{name}"/></shape></scene>'
+    )
+    try:
+        read_mitsuba_xml(scene)
+    except ScenarioError as error:
+        assert len(str(error)) < 1000
+
+
 def test_of_a_list_of_thousands_of_wrong_items_some_are_told() -> None:
     with pytest.raises(MeasurementError, match="more problems") as refused:
         checked_mapping({"echo": {"variable": "echo", "axes": [1] * 9000}})
