@@ -26,6 +26,7 @@ from estimator.compute.distributions import normal_limit
 from estimator.imaging.peak_detection import DYNAMIC_RANGE, peaks_above
 from estimator.imaging.survey_2d import Survey
 from estimator.walls.line_detection import SKIRT, LineCandidate, on_segment
+from estimator.walls.line_extent import largest_sum
 from estimator.walls.ridge_detection import ASIDE, MOST_ENDS, best_segments, width_of
 
 END = 1e-3
@@ -105,11 +106,7 @@ def _lit_part(
     """
     places = line.start + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (line.end - line.start)
     read = np.minimum(over.ravel()[_pixels(looked, places)], CLIP)
-    sums = np.concatenate([[0.0], np.cumsum(read - 0.5 * (1 - np.exp(-CLIP) + read.mean()))])
-    # The lowest sum before each place, and where it is.
-    lowest = np.minimum.accumulate(sums[:-1])
-    last = int(np.argmax(sums[1:] - lowest))
-    first = int(np.argmin(sums[: last + 1]))
+    first, last = largest_sum(read - 0.5 * (1 - np.exp(-CLIP) + read.mean()))
     share = (last - first) / (SAMPLES - 1)
     return LineCandidate(start=places[first], end=places[last], inliers=round(share * line.inliers))
 

@@ -108,11 +108,17 @@ def likeliest_part(over: Float[np.ndarray, " places"], first: int, last: int) ->
         The part to be searched.
     """
     gains = over[first : last + 1] * (1 - 1 / WALL_LEVEL) - np.log(WALL_LEVEL)
+    begin, end = largest_sum(gains)
+    return first + begin, first + end
+
+
+def largest_sum(gains: Float[np.ndarray, " places"]) -> tuple[int, int]:
+    """Return the first and the last place of the run whose gains have the largest sum."""
     sums = np.concatenate([[0.0], np.cumsum(gains)])
-    rises = sums - np.minimum.accumulate(sums)
-    stop = int(np.argmax(rises))
-    begin = int(np.argmin(sums[: stop + 1]))
-    return first + begin, first + stop - 1
+    # The lowest sum before each place, and where it is.
+    lowest = np.minimum.accumulate(sums[:-1])
+    last = int(np.argmax(sums[1:] - lowest))
+    return int(np.argmin(sums[: last + 1])), last
 
 
 def _local_background(
